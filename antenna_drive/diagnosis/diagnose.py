@@ -25,7 +25,7 @@ from antenna_drive.recording.recording import Recording
 from simgap.errors import UserError
 from simgap.machine.by_label import without_labels
 from simgap.machine.check import AT_REST, check_tests, moves
-from simgap.next_test.rivals import Rival
+from simgap.search.rival import Rival
 from simgap.settings import DEFAULT, Settings
 from simgap.verdict.diagnosis import diagnose, Progress
 from simgap.verdict.record import Verdict

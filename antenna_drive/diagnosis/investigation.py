@@ -19,7 +19,7 @@ from antenna_drive.recording.recording import Recording
 from antenna_drive.recording.sheet import dump_sheet, TestSheet
 import numpy as np
 from simgap.next_test.investigation import Bench, InvestigationPlan
-from simgap.next_test.rivals import Rival
+from simgap.search.rival import Rival
 from simgap.settings import DEFAULT, Settings
 from simgap.verdict.diagnosis import Progress
 from simgap.verdict.record import Verdict

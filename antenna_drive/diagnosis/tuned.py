@@ -11,6 +11,7 @@ is beyond the tolerances: the machine is not the one of the configuration.
 from __future__ import annotations
 
 from dataclasses import dataclass
+import math
 from pathlib import Path
 import tempfile
 
@@ -91,9 +92,8 @@ def _outside(problem: LeastSquares, state: FitState) -> tuple[str, ...]:
 
 def _size(z: FloatArray) -> float:
     """Return the size of residuals [of noise]; the few that are far off count as outliers."""
-    z = np.abs(z)
-    level = float(np.sqrt(np.mean(z**2)))
-    for _ in range(10):
+    z, level = np.abs(z), math.inf
+    for _ in range(11):
         level = float(np.sqrt(np.mean(np.minimum(z, DEFAULT.fit.outlier * level)**2)))
     return level
 

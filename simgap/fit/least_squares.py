@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
@@ -49,18 +48,6 @@ class LeastSquares:
         """Return the same problem at another noise scale."""
         return LeastSquares(self.machine, scale=scale, settings=self.settings)
 
-    def of_experiment(self, experiment: int) -> LeastSquares:
-        """Return the problem in which one experiment alone counts, at the sensors' own noise."""
-        return LeastSquares(self.machine, [
-            np.full(e.time.size, k == experiment) for k, e in enumerate(self.experiments)],
-            settings=self.settings)
-
-    def best_fitted(self, state: FitState) -> int:
-        """Return the experiment with the least loss per sample."""
-        return int(np.argmin([
-            self.loss(state.residual[self.rows(k)]) / max(self.valid[self.rows(k)].sum(), 1)
-            for k in range(len(self.experiments))]))
-
     def rows(self, experiment: int) -> slice:
         """Return where an experiment's residuals lie."""
         end = int(self.ends[experiment])
@@ -100,19 +87,6 @@ class LeastSquares:
     def _row(self, result: Sequence[FloatArray | None]) -> FloatArray:
         return np.concatenate([self.standardised(k, values) for k, values in enumerate(result)])
 
-    def rescaled(self, state: FitState, scale: float) -> FitState:
-        """Return a state of a problem with another noise scale, without its Jacobian."""
-        residual = state.residual * (scale / self.scale)
-        return replace(state.without_jacobian(), residual=residual,
-                       cost=self.cost(residual, state.x, prior_precision(state.parameters)))
-
-    def evaluated(self, state: FitState) -> FitState:
-        """Return a state of a problem with other noise as it is in this one, not fitted."""
-        residual = self.residuals(state.point())
-        return replace(state.without_jacobian(keep_hessian=True), residual=residual,
-                       weight=self.weights(residual),
-                       cost=self.cost(residual, state.x, prior_precision(state.parameters)))
-
     def noise_level(self, residual: FloatArray) -> float:
         """Return the size of residuals in standard deviations of the noise, outliers clipped."""
         z = np.abs(residual[self.valid]) * self.scale
@@ -120,10 +94,6 @@ class LeastSquares:
         for _ in range(10):
             level = float(np.sqrt(np.mean(np.minimum(z, self.settings.fit.outlier * level) ** 2)))
         return level
-
-    def leaves_much(self, state: FitState) -> bool:
-        """Return whether a fit leaves more than the sensors' noise."""
-        return self.noise_level(state.residual) > self.settings.search.wanting
 
     def jacobian(self, point: dict[str, float], parameters: Sequence[Parameter],
                  residual: FloatArray, central: bool,
@@ -207,14 +177,6 @@ class LeastSquares:
                                 p.least_step), p.step)
                 for p, seen in zip(state.parameters, visible.tolist(), strict=True)
                 if not p.is_shape}
-
-    def extended(self, state: FitState, parameters: Sequence[Parameter],
-                 values: Sequence[float], columns: Jacobian) -> FitState:
-        """Return the state with more parameters, at these values, with these derivatives."""
-        x = np.r_[state.x, values]
-        everything = (*state.parameters, *parameters)
-        return self._state(everything, x, self.residuals(point_of(everything, x)),
-                           np.column_stack([state.jacobian, columns]), state.weight)
 
     def with_columns(self, state: FitState, indices: Sequence[int], columns: Jacobian) -> FitState:
         """Return the state with other derivatives by some of its parameters."""

@@ -23,7 +23,7 @@ from simgap.model.declared import Model
 from simgap.model.machine import OwnMachine
 from simgap.model.pushes import pushes
 from simgap.model.response import derivative_error
-from simgap.next_test.rivals import Rival
+from simgap.search.rival import Rival
 from simgap.settings import DEFAULT, Settings
 from simgap.verdict.diagnosis import diagnose, Progress
 from simgap.verdict.record import Verdict

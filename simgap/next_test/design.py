@@ -138,19 +138,15 @@ class TestDesign:
     def _helps(self, test: Candidate) -> bool:
         least = self._settings.planning.least_information
         if test.separation is not None:
-            return test.separation.information(self._temperature) >= least
+            return test.separation.information() >= least
         if test.deviations:
             return any(after < (1.0 - least) * before
                        for before, after in test.deviations.values())
         return not test.sizes or any(math.isfinite(size) for size, _ in test.sizes.values())
 
-    @property
-    def _temperature(self) -> float:
-        return self._settings.verdict.temperature
-
     def _score(self, found: Separation) -> float:
         """Return the information that is left if less of the evidence comes true."""
-        return found.information(self._temperature, self._settings.planning.caution)
+        return found.information(self._settings.planning.caution)
 
     def _planned(self, test: Candidate) -> Machine:
         """Return the machine in a test, as noisy as it has been so far."""
@@ -203,8 +199,7 @@ class TestDesign:
     def _confirmed(self, test: Candidate) -> Candidate:
         """Fit each rival to the readings of the others; the rest then counts in full."""
         return replace(test, kept=1.0, confirmed=confirmed_separation(
-            self._planned(test), self._rivals, self._inflated, self._settings,
-            test.promised.shrunk if test.promised else ()))
+            self._planned(test), self._rivals, self._inflated, self._settings))
 
     def _sharpened(self, test: Candidate) -> Candidate:
         """Judge how well a test determines the numbers of the likeliest rival."""
@@ -273,7 +268,7 @@ class TestDesign:
 
     def _alike(self, judged: Sequence[Candidate]) -> list[tuple[int, int, Mapping[str, float]]]:
         compared = [test for test in judged if test.separation is not None]
-        limit = self._settings.planning.alike * self._temperature
+        limit = self._settings.planning.alike
         found = []
         for i, j in combinations(range(len(self._rivals)), 2):
             lacks = [test.separation.least_lack()[i, j] for test in compared

@@ -4,7 +4,6 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-import math
 
 import numpy as np
 from scipy import linalg
@@ -13,8 +12,9 @@ from simgap.fit.least_squares import LeastSquares
 from simgap.fit.noise import with_model_error
 from simgap.fit.state import proper_precision
 from simgap.machine.contract import FloatArray, Machine, Parameter, Point
-from simgap.next_test.rivals import known_to, numbers_of, Rival
-from simgap.next_test.separation import LEAST, odds_of, prior_of, Separation, shrunk_at_most
+from simgap.next_test.rivals import known_to, numbers_of
+from simgap.next_test.separation import LEAST, prior_of, Separation
+from simgap.search.rival import Rival
 from simgap.settings import DEFAULT, Settings
 
 
@@ -33,21 +33,16 @@ def separation(machine: Machine, rivals: Sequence[Rival], inflated: float,
     prior, lack = prior_of(rivals), np.zeros((len(rivals), len(rivals)))
     channels = problem.experiments[0].channels
     power = np.zeros(len(channels))
-    shrunk: list[dict[str, float]] = []
     for j, rival in enumerate(rivals):
         off = residuals[j] - residuals
         price = np.zeros(len(rivals))
         rest = off
         if follow:
-            price, rest, shares = _followed(problem, rival, points[j], off, inflated)
-            shrunk.append(shares)
+            price, rest = _followed(problem, rival, points[j], off, inflated)
         lack[:, j] = 0.5 * (np.sum(rest ** 2, axis=1) + price) / inflated
         power += prior @ np.sum(rest.reshape(len(rivals), -1, power.size) ** 2, axis=1)
-    if not follow:
-        shrunk = [shrunk_at_most(rivals, i, lack[i]) for i in range(len(rivals))]
     parts = power / max(float(power.sum()), LEAST)
-    return Separation(prior, lack, dict(zip(channels, parts.tolist(), strict=True)),
-                      odds=odds_of(rivals, lack, shrunk), shrunk=shrunk)
+    return Separation(prior, lack, dict(zip(channels, parts.tolist(), strict=True)))
 
 
 def deviations(machine: Machine, rival: Rival, inflated: float,
@@ -79,14 +74,14 @@ def planned(machine: Machine, rivals: Sequence[Rival], points: Sequence[Point],
 
 
 def _followed(problem: LeastSquares, rival: Rival, point: dict[str, float], off: FloatArray,
-              inflated: float) -> tuple[FloatArray, FloatArray, dict[str, float]]:
+              inflated: float) -> tuple[FloatArray, FloatArray]:
     """Return what remains of differences after a rival's numbers have followed them."""
     # The differences `off` are in standard deviations, shape (r, n). What is returned: what the
-    # steps away from what is known add to each chi-square, shape (r,), the differences that are
-    # left, and the share to which the deviation of each size in doubt shrinks.
+    # steps away from what is known add to each chi-square, shape (r,), and the differences that
+    # are left.
     numbers = numbers_of(problem.machine, rival)
     if not numbers:
-        return np.zeros(len(off)), off, {}
+        return np.zeros(len(off)), off
     jacobian = problem.jacobian(point, numbers, problem.residuals(point), central=False)
     precision = _precision(rival, numbers, inflated)
     known = (jacobian.T @ jacobian).astype(float) + precision
@@ -94,16 +89,9 @@ def _followed(problem: LeastSquares, rival: Rival, point: dict[str, float], off:
     slopes = (off.astype(np.float32) @ jacobian).astype(float) / scale
     factor = factored(known / np.outer(scale, scale), ROUNDING)
     steps = solved(factor, slopes.T).T / scale
-    in_doubt = {doubt.size for doubt in rival.doubts.values()}
-    shares = {}
-    for place, name in enumerate(p.name for p in numbers):
-        if name in in_doubt:
-            unit = np.eye(scale.size)[place]
-            variance = inflated * solved(factor, unit)[place] / scale[place] ** 2
-            shares[name] = min(math.sqrt(max(variance, 0.0)) / rival.deviation(name), 1.0)
     # summed directly: the difference of two large sums in single precision cannot resolve it
     return (np.asarray(np.sum((steps @ precision) * steps, axis=1)),
-            np.asarray(off - steps @ jacobian.T), shares)
+            np.asarray(off - steps @ jacobian.T))
 
 
 def _precision(rival: Rival, numbers: Sequence[Parameter], inflated: float) -> FloatArray:

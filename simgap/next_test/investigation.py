@@ -15,8 +15,9 @@ from simgap.drafts import drafted
 from simgap.errors import UserError
 from simgap.next_test.design import DesignEffort, objective_for, TestDesign
 from simgap.next_test.proposal import as_data
-from simgap.next_test.rivals import Findings, Rival
+from simgap.next_test.rivals import Findings
 from simgap.next_test.space import TestSpace
+from simgap.search.rival import Rival
 from simgap.settings import DEFAULT, Settings
 from simgap.verdict.diagnosis import Progress as Share
 from simgap.verdict.record import Verdict

@@ -11,8 +11,9 @@ import numpy as np
 from simgap.machine.contract import FloatArray
 from simgap.next_test.candidate import Candidate, Proposal
 from simgap.next_test.design import DesignEffort, SEPARATE
-from simgap.next_test.rivals import known_to, Rival
+from simgap.next_test.rivals import known_to
 from simgap.next_test.space import TestSpace
+from simgap.search.rival import Rival
 from simgap.settings import DEFAULT, Settings
 
 _OTHERS, _SENSORS, _SIZES = 4, 3, 12
@@ -64,21 +65,21 @@ def _told(test: Candidate, rivals: Sequence[Rival], settings: Settings) -> dict[
                                for name, (before, after) in test.deviations.items()}
     told, first = test.separation, test.promised
     if told is not None:
-        temperature, sure = settings.verdict.temperature, settings.planning.sure
-        after = told.posterior(temperature)
+        sure = settings.planning.sure
+        after = told.posterior()
         found['expected'] = {
             'confirmed': test.confirmed is not None,
             'right_before': float(told.prior @ told.prior),
-            'right_after': told.expected(temperature),
-            'information_nat': told.information(temperature),
-            'surely': told.surely(temperature, sure), 'sure': sure,
+            'right_after': told.expected(),
+            'information_nat': told.information(),
+            'surely': told.surely(sure), 'sure': sure,
             'each': [{'effects': list(rival.named) or ['none'], 'before': float(told.prior[i]),
                       'after_if_true': float(after[i, i]), 'after': after[i].tolist()}
                      for i, rival in enumerate(rivals)],
             'lack_of_fit': told.lack.tolist()}
         if first is not None:
             found['channels'] = dict(first.channels)
-            found['expected']['promised'] = first.expected(temperature)
+            found['expected']['promised'] = first.expected()
         found['sizes_over_least'] = test.coarseness
     elif test.sizes:
         found['smallest_sizes'] = {

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Each rival fitted to the readings that each other one would give in a planned test."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from copy import copy
 from dataclasses import replace
 
@@ -10,8 +10,9 @@ import numpy as np
 from simgap.fit.least_squares import LeastSquares
 from simgap.machine.contract import FloatArray, Machine, Parameter, Point
 from simgap.next_test.discrimination import planned
-from simgap.next_test.rivals import known_to, numbers_of, Rival
-from simgap.next_test.separation import odds_of, prior_of, Separation
+from simgap.next_test.rivals import known_to, numbers_of
+from simgap.next_test.separation import prior_of, Separation
+from simgap.search.rival import Rival
 from simgap.settings import DEFAULT, Settings
 
 # A fit goes this many standard deviations away at most, and a difference quotient this far.
@@ -19,14 +20,13 @@ _FAR, _STEP = 8.0, 0.3
 
 
 def confirmed_separation(machine: Machine, rivals: Sequence[Rival], inflated: float,
-                         settings: Settings = DEFAULT,
-                         shrunk: Sequence[Mapping[str, float]] = ()) -> Separation:
+                         settings: Settings = DEFAULT) -> Separation:
     """
     Return how well tests tell rivals apart, with each fitted to the readings of each other one.
 
     The true rival is fitted as well, from a standard deviation away along each direction: what
-    such a fit leaves because it sticks is not evidence against the others. `shrunk` comes from
-    `separation`, whose parameters the others are.
+    such a fit leaves because it sticks is not evidence against the others. Parameters are those of
+    `separation`.
     """
     points = [known_to(machine, rival) for rival in rivals]
     problem = planned(machine, rivals, points, settings)
@@ -48,14 +48,11 @@ def confirmed_separation(machine: Machine, rivals: Sequence[Rival], inflated: fl
                 # it depends on the point, and not on what was measured
                 jacobian = state.base_jacobian
             state = fitted.fit(state, settings.search.iterations)
-            for _ in range(settings.planning.passes):
-                state = fitted.fit(fitted.refreshed(state), settings.search.iterations)
+            state = fitted.fit(fitted.refreshed(state), settings.search.iterations)
             left[i, j] = state.cost / inflated
             ends[i, j] = own.own(state.point())
     lack = np.maximum(left - np.diag(left)[:, np.newaxis], 0.0)
-    shrunk = shrunk or [{} for _ in rivals]
-    return Separation(prior_of(rivals), lack, points=ends, odds=odds_of(rivals, lack, shrunk),
-                      shrunk=shrunk)
+    return Separation(prior_of(rivals), lack, points=ends)
 
 
 class _Continued(Machine):

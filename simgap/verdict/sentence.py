@@ -9,6 +9,7 @@ from typing import Any, NamedTuple, TYPE_CHECKING
 
 from simgap.next_test.design import objective_for, SEPARATE
 from simgap.next_test.rivals import Findings
+from simgap.settings import DEFAULT
 from simgap.verdict.intervals import jackknife, TWO_SIDED_95
 from simgap.verdict.spoken import percent, quantity, size, with_interval
 
@@ -17,8 +18,6 @@ if TYPE_CHECKING:
 
 # A machine without words of its own has so many numbers of an effect listed.
 _LISTED = 4
-# An interval is wide from this share of its number to each side; what makes half of it is why.
-_WIDE, _HALF = 0.4, 0.5
 
 
 class Said(NamedTuple):
@@ -112,13 +111,14 @@ def _why_wide(verdict: Verdict) -> Iterator[str]:
              if not (form.is_course or form.is_wave) for p in form.sizes}
     for name, item in top.parameters.items():
         half = 0.5 * (item['ci95'][1] - item['ci95'][0])
-        if name not in sizes or half <= _WIDE * abs(item['value']):
+        if name not in sizes or half <= DEFAULT.verdict.wide * abs(item['value']):
             continue
+        # what makes half of it is why
         turns = [fold['values'][name] for fold in folds if name in fold['values']]
-        if TWO_SIDED_95 * jackknife(turns) >= _HALF * half:
+        if TWO_SIDED_95 * jackknife(turns) >= 0.5 * half:
             why = ('the recordings differ: without one or another it is '
                    f'{size(min(turns), item["unit"])} to {size(max(turns), item["unit"])}')
-        elif sizes[name].tolerance >= _HALF * half:
+        elif sizes[name].tolerance >= 0.5 * half:
             why = ('a healthy machine may have up to '
                    f'{size(sizes[name].tolerance, item["unit"])} of it')
         else:

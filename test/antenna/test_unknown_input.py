@@ -77,7 +77,7 @@ def test_evidence_is_that_of_a_normal_distribution() -> None:
     random = np.random.default_rng(1)
     columns = random.normal(size=(40, 6))
     residual = columns @ random.normal(size=6) * 1.5 + random.normal(size=40)
-    inputs = _Evidence(residual, np.ones(40), np.zeros((40, 1)), np.ones(1))
+    inputs = _Evidence(residual, 1.0, np.ones(40), np.zeros((40, 1)), np.ones(1))
 
     class One:
         """A problem of one experiment."""

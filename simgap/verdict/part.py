@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""Fits to a part of the tests, which begin at the model as configured and see nothing else."""
+"""A part of the tests of a machine; what is not among them cannot reach a fit."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 import math
 from types import MappingProxyType
@@ -12,12 +12,10 @@ from types import MappingProxyType
 import numpy as np
 from simgap.fit.broyden import Jacobian
 from simgap.fit.least_squares import LeastSquares
-from simgap.fit.starts import settled, with_initial_conditions
 from simgap.fit.state import FitState
 from simgap.machine.contract import (
-    Experiment, FloatArray, Form, Machine, Nuisances, Parameter, Point, TimeScales,
+    Experiment, FloatArray, Machine, Nuisances, Parameter, Point, TimeScales,
 )
-from simgap.settings import Settings
 
 
 class Part(Machine):
@@ -86,47 +84,3 @@ class Slopes:
         column = {p.name: j for j, p in enumerate(self.parameters)}
         return np.concatenate([self.jacobian[self.rows[k]] for k in part.chosen])[
             :, [column[p.name] for p in parameters]]
-
-
-def begun(part: Part, forms: Sequence[Form], point: Mapping[str, float],
-          settings: Settings) -> dict[str, float]:
-    """Return a point with the sizes at which a fit to a part may begin, the best of the trials."""
-    # A strong effect may bend the misfit so much that its derivative at zero leads nowhere.
-    at = dict(point)
-    problem = LeastSquares(part, settings=settings)
-    problem = problem.at_scale(max(problem.noise_level(problem.residuals(at)), 1.0))
-    for form in forms:
-        at = min((at, *({**at, **trial} for trial in form.trials)),
-                 key=lambda point: problem.loss(problem.residuals(point)))
-    return at
-
-
-def trained(part: Part, parameters: Sequence[Parameter], point: Mapping[str, float],
-            slopes: Sequence[Jacobian], settings: Settings) -> FitState:
-    """
-    Fit parameters to a part of the tests, from a point far from the optimum to the end.
-
-    While much is left, the misfit counts as noise: at the sensors' own noise a robust loss does
-    not lead across a large misfit. `slopes`, shape (n, m) each, only begin the stages of the fit.
-    """
-    options, search = settings.held_out, settings.search
-    at = with_initial_conditions(LeastSquares(part, settings=settings), dict(point))
-    scale = math.inf
-    number = 0
-    while scale > 1.0:
-        level = LeastSquares(part, settings=settings)
-        lower = level.noise_level(level.residuals(at))
-        lowered = lower < search.sharper * scale
-        scale = lower if lower > search.strong and lowered else 1.0
-        problem = LeastSquares(part, scale=scale, settings=settings)
-        if number == 1:
-            # what was taken for the place in a gap may have been the effect
-            at = with_initial_conditions(problem, at)
-        given = slopes[min(number, len(slopes) - 1)] / np.float32(scale)
-        if scale > 1.0:
-            # far from the sizes, a shape would be turned the wrong way: the order of a ripple
-            given[:, [p.is_shape for p in parameters]] = 0.0
-        state = problem.fit(problem.start(parameters, at, given), options.iterations)
-        at = state.point()
-        number += 1
-    return settled(problem, state, search, options.passes, options.iterations)

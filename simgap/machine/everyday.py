@@ -1,0 +1,199 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+A machine with a little of each effect, as every machine has it.
+
+No size is exactly zero. Up to the tolerance of its catalogue an effect is no fault, but it shows,
+and what shows and has no name would be taken for another effect. So each has a nuisance of its own
+whose prior is its everyday size. What so little does is linear in the size: its derivative is
+taken once, at the model as configured and again at the best answer, and such a nuisance costs no
+run.
+"""
+
+from collections.abc import Collection, Iterator, Sequence
+from copy import copy
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from simgap.machine.arrays import Course, FloatArray, Point
+from simgap.machine.catalogue import Catalogue
+from simgap.machine.effect import Form, Parameter
+from simgap.machine.experiment import Experiment
+from simgap.machine.machine import DisturbanceInput, Machine
+from simgap.machine.motion import Motion, TimeScales
+
+# The standard deviation of an everyday size, as a share of the tolerance.
+EVERYDAY = 0.5
+_PREFIX = 'everyday:'
+
+
+def with_everyday(machine: Machine) -> Machine:
+    """Return a machine with everyday sizes; itself if no effect has one that is not a nuisance."""
+    neutral = machine.simulate([{}])[0]
+    residuals = [e.measured - predicted for e, predicted in zip(
+        machine.experiments, neutral, strict=True) if predicted is not None]
+    sizes: dict[str, tuple[Parameter, Point]] = {}
+    for form in _forms(machine, residuals):
+        for p in _sizes(machine, form):
+            # of forms that are alike near zero the first one stands for all
+            sizes.setdefault(p.name, (p, form.start))
+    if not sizes:
+        return machine
+    numbers = tuple(sizes.values())
+    return _Everyday(machine, numbers, _responses(machine, numbers, {}))
+
+
+def _responses(machine: Machine, numbers: Sequence[tuple[Parameter, Point]],
+               point: Point) -> list[NDArray[np.floating[Any]]]:
+    """Return the derivatives by sizes, with the shapes of their forms, at a point."""
+    steps = [p.step if point.get(p.name, 0.0) + p.step <= p.high else -p.step for p, _ in numbers]
+    before, *after = machine.low_fidelity().simulate([point, *(
+        {**start, **point, p.name: point.get(p.name, 0.0) + step}
+        for (p, start), step in zip(numbers, steps, strict=True))])
+    return [np.stack([
+        np.nan_to_num((row[k] - before[k]) / step).ravel()  # type: ignore[operator]
+        for step, row in zip(steps, after, strict=True)], axis=-1)
+        for k in range(len(machine.experiments))]
+
+
+def everyday_of(name: str) -> str:
+    """Return the size, by the name of its nuisance; empty for another nuisance."""
+    return name.removeprefix(_PREFIX) if name.startswith(_PREFIX) else ''
+
+
+def large_everyday(numbers: Sequence[Parameter], values: FloatArray, large: float) -> set[str]:
+    """Return the sizes whose everyday sizes are so many of their deviations or more, by name."""
+    return {everyday_of(p.name) for p, value in zip(numbers, values.tolist(), strict=True)
+            if everyday_of(p.name) and abs(value) > large * p.prior_sigma}
+
+
+def taken_over(catalogue: Catalogue, effect: str, form: Form, point: Point) -> dict[str, float]:
+    """Return a point in which the sizes of an effect begin at what its everyday sizes had."""
+    # the two do the same, and a fit does not find from one to the other
+    found, whole = dict(point), catalogue[effect]
+    forms = [catalogue.counterpart(form, whole, catalogue[part]) for part in whole.parts] or [form]
+    for places in zip(form.parameters, *(own.parameters for own in forms), strict=True):
+        p, *own = places
+        had = [found.get(_PREFIX + item.name, 0.0) for item in own]
+        if any(had) and not p.is_shape:
+            found.update({_PREFIX + item.name: 0.0 for item in own})
+            found[p.name] = min(max(sum(had) / len(had), p.low), p.high)
+    return found
+
+
+def as_configured(machine: Machine) -> Machine:
+    """Return the machine without everyday sizes."""
+    return machine.inner if isinstance(machine, _Everyday) else machine
+
+
+def _forms(machine: Machine, residuals: Sequence[FloatArray]) -> Iterator[Form]:
+    for effect in machine.catalogue.values():
+        # what acts in several places acts in each of them
+        if not effect.parts:
+            yield from machine.catalogue.forms(effect, machine.experiments, residuals)
+
+
+def _sizes(machine: Machine, form: Form) -> list[Parameter]:
+    """Return the sizes of a form that have an everyday size which no nuisance stands for."""
+    nuisances = machine.nuisances
+    neutral = {p.name: 0.0 for p in nuisances}
+    return [] if form.is_course else [
+        p for p in form.sizes
+        if p.tolerance > 0.0 and nuisances.absorb(neutral, {p.name: p.step}) == neutral]
+
+
+class _Everyday(Machine):
+    """
+    A machine with everyday sizes.
+
+    sizes : those of the inner machine, m of them, with the shapes of their forms
+    responses : derivatives of the readings by them in each experiment, shape (n c, m)
+    """
+
+    def __init__(self, inner: Machine, sizes: tuple[tuple[Parameter, Point], ...],
+                 responses: Sequence[NDArray[np.floating[Any]]]) -> None:
+        self._numbers = tuple(
+            Parameter(_PREFIX + p.name, p.unit, -math.inf, math.inf, p.step,
+                      EVERYDAY * p.tolerance) for p, _ in sizes)
+        nuisances = copy(inner.nuisances)
+        nuisances.extend(self._numbers)
+        super().__init__(inner.experiments, nuisances, inner.catalogue)
+        self.inner, self._sizes = inner, sizes
+        # single precision: they are read at every run
+        self._responses: list[NDArray[np.floating[Any]]] = [
+            np.ascontiguousarray(item, np.float32) for item in responses]
+        self._last: dict[int, tuple[bytes, FloatArray]] = {}
+        self.disturbance_inputs, self.notes = inner.disturbance_inputs, inner.notes
+        self.diagram, self.advice, self.words = inner.diagram, inner.advice, inner.words
+        self.planning = inner.planning
+
+    def _parted(self, point: Point) -> tuple[dict[str, float], FloatArray]:
+        """Return a point in the inner machine's names, and the everyday sizes, shape (m,)."""
+        return ({name: value for name, value in point.items() if not everyday_of(name)},
+                np.array([point.get(p.name, 0.0) for p in self._numbers]))
+
+    def _with(self, readings: FloatArray, experiment: int, sizes: FloatArray) -> FloatArray:
+        """Return readings with what the everyday sizes add."""
+        if not sizes.any():
+            return readings
+        # most runs differ in other numbers
+        known, added = self._last.get(experiment, (b'', readings))
+        if known != (same := sizes.tobytes()):
+            added = np.asarray(self._responses[experiment] @ sizes.astype(np.float32),
+                               np.float64).reshape(readings.shape)
+            self._last[experiment] = same, added
+        return np.asarray(readings + added)
+
+    def predict(self, point: Point, experiment: int) -> FloatArray:
+        inner, sizes = self._parted(point)
+        return self._with(self.inner.predict(inner, experiment), experiment, sizes)
+
+    def simulate(self, points: Sequence[Point], only: Sequence[int | None] | None = None,
+                 until: float = math.inf) -> list[list[FloatArray | None]]:
+        parted = [self._parted(point) for point in points]
+        rows = self.inner.simulate([inner for inner, _ in parted], only, until)
+        return [[None if values is None else self._with(values, k, sizes)
+                 for k, values in enumerate(row)]
+                for (_, sizes), row in zip(parted, rows, strict=True)]
+
+    def simulate_disturbed(self, point: Point, place: DisturbanceInput,
+                           course: Course) -> list[FloatArray]:
+        inner, sizes = self._parted(point)
+        return [self._with(values, k, sizes) for k, values in enumerate(
+            self.inner.simulate_disturbed(inner, place, course))]
+
+    @property
+    def time_scales(self) -> TimeScales:
+        return self.inner.time_scales
+
+    def motion(self, experiment: int) -> Motion:
+        return self.inner.motion(experiment)
+
+    def _around(self, inner: Machine) -> Machine:
+        if inner is self.inner:
+            return self
+        # a truncated machine has the first part of each test
+        return _Everyday(inner, self._sizes, [
+            response[:e.measured.size] for e, response in zip(
+                inner.experiments, self._responses, strict=True)])
+
+    def truncated(self) -> Machine:
+        return self._around(self.inner.truncated())
+
+    def low_fidelity(self) -> Machine:
+        return self._around(self.inner.low_fidelity())
+
+    def with_experiments(self, experiments: Sequence[Experiment]) -> Machine:
+        return self._around(self.inner.with_experiments(experiments))
+
+    def without(self, effects: Collection[str]) -> Machine:
+        return self._around(self.inner.without(effects))
+
+    def with_noise_at(self, point: Point) -> Machine:
+        return self._around(self.inner.with_noise_at(self._parted(point)[0]))
+
+    def linearised_at(self, point: Point) -> Machine:
+        return _Everyday(self.inner, self._sizes, _responses(
+            self.inner, self._sizes, self._parted(point)[0]))
