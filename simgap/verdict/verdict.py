@@ -78,7 +78,7 @@ def unknown_probability(found: Found, places: Sequence[Place]) -> float:
     settings, evidence = found.problem.settings.verdict, found.evidence
     best = max(places, key=lambda place: place.evidence, default=None)
     if best is None or best.evidence / evidence.temperature < (
-            evidence.price_of_form if found.best.effects else 0.0):
+            evidence.price_of_form(True) if found.best.effects else 0.0):
         return settings.least_unknown
     beyond = (best.explained - settings.left) / settings.left_width
     share = 0.5 * (1.0 + math.tanh(0.5 * beyond))

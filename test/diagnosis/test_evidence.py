@@ -60,6 +60,13 @@ def fitted(problem: LeastSquares, effects: str) -> Hypothesis:
     return Hypothesis(tuple(effects), forms, problem.refreshed(problem.fit(state, 20)))
 
 
+def with_everyday(hypothesis: Hypothesis, size: float) -> Hypothesis:
+    """Return a hypothesis whose sizes have an everyday one."""
+    return replace(hypothesis, forms=tuple(
+        replace(form, parameters=tuple(replace(p, tolerance=size) for p in form.parameters))
+        for form in hypothesis.forms))
+
+
 def plain(problem: LeastSquares, tempered: float = 1.0, gain: float = 0.0) -> Evidence:
     """Return the evidence at a temperature."""
     return Evidence(problem.settings.evidence, problem.samples, tempered, gain)
@@ -171,18 +178,21 @@ def test_an_order_that_was_sought_has_its_price() -> None:
     assert evidence(single) - evidence(sought) == pytest.approx(DEFAULT.evidence.sought)
 
 
+@pytest.mark.parametrize('everyday', [0.0, 1e-9])
 @pytest.mark.parametrize('tempered', [1.0, 1.001, 3.0])
-def test_a_partner_has_to_gain_more_than_an_error_of_form_leaves(tempered: float) -> None:
-    """A form wrong by a share leaves the square of that share of its gain, where that shows."""
+def test_a_partner_has_to_gain_more_than_an_error_of_form_leaves(
+        tempered: float, everyday: float) -> None:
+    """A form wrong by a share leaves the square of that share of its gain."""
     problem = LeastSquares(machine(2, {'a.size': 3.0, 'c.size': 0.5}))
     none, single, pair, three = (
-        fitted(problem, effects) for effects in ('', 'a', 'ac', 'acd'))
+        with_everyday(fitted(problem, effects), everyday) for effects in ('', 'a', 'ac', 'acd'))
     gain = none.cost - min(pair.cost, three.cost)
     found = Evidence.among(problem, [none, single, pair, three])
     assert found.gain == pytest.approx(gain)
     plainly, dear = plain(problem, tempered), plain(problem, tempered, gain)
-    price = min(DEFAULT.evidence.form_error ** 2 * gain,
-                0.5 * (tempered - 1.0) * problem.samples) / tempered
+    price = DEFAULT.evidence.form_error ** 2 * gain / tempered
+    if everyday:  # what everyday sizes leave is all that an error of form can be
+        price = min(price, 0.5 * (tempered - 1.0) * problem.samples / tempered)
     for hypothesis, times in ((none, 0), (single, 0), (pair, 1), (three, 2)):
         assert plainly(hypothesis) - dear(hypothesis) == pytest.approx(times * price)
 

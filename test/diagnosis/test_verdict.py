@@ -31,8 +31,9 @@ shares = st.floats(0.0, 1.0)
 
 def fitted(cost: float, *effects: str, within: str = '') -> Hypothesis:
     """Return a hypothesis of this cost; one of its effects may be within its tolerance."""
-    forms = tuple(Form('', (replace(NUMBER, name=f'{effect}.size',
-                                    tolerance=2.0 * (effect == within)),)) for effect in effects)
+    forms = tuple(Form('', (replace(
+        NUMBER, name=f'{effect}.size', tolerance=2.0 if effect == within else NUMBER.tolerance),))
+        for effect in effects)
     blank = np.zeros(0)
     return Hypothesis(effects, forms, FitState(
         tuple(form.parameters[0] for form in forms), np.ones(len(effects)), blank,
@@ -183,7 +184,7 @@ def test_the_more_an_unknown_input_explains_the_likelier_is_the_unknown(
 def test_what_an_unknown_input_explains_for_no_good_evidence_is_not_unknown() -> None:
     """Beside an effect, an input must be worth more than the effect's error of form could be."""
     named = found(fitted(100000.0), fitted(2000.0, 'axis.inertia'), tempered=4.0)
-    price = 4.0 * named.evidence.price_of_form
+    price = 4.0 * named.evidence.price_of_form(everyday=True)
     assert unknown_probability(named, []) == SETTINGS.least_unknown
     assert unknown_probability(named, [place(0.9, 0.9 * price)]) == SETTINGS.least_unknown
     assert unknown_probability(named, [place(0.9, 1.1 * price)]) == pytest.approx(
