@@ -66,8 +66,6 @@ class SearchSettings:
     iterations: int = _at(8, '1', 'iterations of a fit between two Jacobians')
     settled: float = _at(
         2e-3, '1', 'gain of a pass, as a share of the cost, below which a fit has ended')
-    large: float = _at(
-        3.0, 'everyday size', 'everyday size from which an effect is tried in its place')
     finalists: int = _at(6, '1', 'hypotheses that are fitted to the whole tests')
     passes: int = _at(2, '1', 'fresh Jacobians of the fit that is judged')
 

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-import math
 
 from antenna_drive.diagnosis.modifiers import AntennaParameter, RunModifier, RunSetup
 import numpy as np
@@ -16,6 +15,8 @@ from simgap.machine.contract import FloatArray, Form
 ID = 'axis.wind_gust'
 # The torque is free at times this far apart [s], and smooth between.
 KNOT_S = 0.5
+# How many deviations what differs from day to day may have.
+WIDEST = 3.0
 # The wind of every day is slower: its knots are this many of those apart.
 _CALM = 2
 # Within this time a smooth torque is taken as a straight line [s].
@@ -56,8 +57,8 @@ def everyday_wind(k: int, test: str, first_s: float, last_s: float,
                   torque: float) -> Iterator[AntennaParameter]:
     """Yield the knots of the wind of every day in test k while it is seen, of this rms [N m]."""
     for i in range(_CALM * int(first_s / (_CALM * KNOT_S)), knots(last_s), _CALM):
-        yield AntennaParameter(f'wind:{test}:{i}', 'N m', -math.inf, math.inf, torque, torque,
-                               experiment=k, modifier=_Knot(i, _CALM))
+        yield AntennaParameter(f'wind:{test}:{i}', 'N m', -WIDEST * torque, WIDEST * torque,
+                               torque, torque, experiment=k, modifier=_Knot(i, _CALM))
 
 
 def course(torque: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -14,7 +14,7 @@ from itertools import product
 import math
 
 from antenna_drive.diagnosis.field_test import FieldTest
-from antenna_drive.diagnosis.gust import everyday_wind
+from antenna_drive.diagnosis.gust import everyday_wind, WIDEST
 from antenna_drive.diagnosis.modifiers import (
     ADD, add, AntennaParameter, KnownModifiers, Modifier, RecorderError, scale, SupplyGain,
     Unrecorded,
@@ -141,8 +141,9 @@ def _of_a_test(k: int, test: FieldTest, tolerance: float) -> Iterator[AntennaPar
                            modifier=RecorderError('clock'))
 
     for path in _OF_A_DAY:
-        yield AntennaParameter(f'day:{path}:{test.name}', '1', -0.3, 0.3, 0.01, _WARMTH,
-                               experiment=k, modifier=scale(path))
+        yield AntennaParameter(f'day:{path}:{test.name}', '1', -WIDEST * _WARMTH,
+                               WIDEST * _WARMTH, 0.01, _WARMTH, experiment=k,
+                               modifier=scale(path))
     axis = test.record['plant']['axis']
     friction = float(axis['coulomb_torque'][0] * axis['friction_torque_per_ampere'][0]
                      * axis['gear_ratio'][0])

@@ -5,7 +5,7 @@ A machine with a little of each effect, as every machine has it.
 
 No size is exactly zero. Up to the tolerance of its catalogue an effect is no fault, but it shows,
 and what shows and has no name would be taken for another effect. So each has a nuisance of its own
-whose prior is its everyday size. What so little does is linear in the size: its derivative is
+within the tolerance, whose prior is its everyday size. What so little does is linear in the size: its derivative is
 taken once, at the model as configured and again at the best answer, and such a nuisance costs no
 run.
 """
@@ -63,12 +63,6 @@ def everyday_of(name: str) -> str:
     return name.removeprefix(_PREFIX) if name.startswith(_PREFIX) else ''
 
 
-def large_everyday(numbers: Sequence[Parameter], values: FloatArray, large: float) -> set[str]:
-    """Return the sizes whose everyday sizes are so many of their deviations or more, by name."""
-    return {everyday_of(p.name) for p, value in zip(numbers, values.tolist(), strict=True)
-            if everyday_of(p.name) and abs(value) > large * p.prior_sigma}
-
-
 def taken_over(catalogue: Catalogue, effect: str, form: Form, point: Point) -> dict[str, float]:
     """Return a point in which the sizes of an effect begin at what its everyday sizes had."""
     # the two do the same, and a fit does not find from one to the other
@@ -115,7 +109,7 @@ class _Everyday(Machine):
     def __init__(self, inner: Machine, sizes: tuple[tuple[Parameter, Point], ...],
                  responses: Sequence[NDArray[np.floating[Any]]]) -> None:
         self._numbers = tuple(
-            Parameter(_PREFIX + p.name, p.unit, -math.inf, math.inf, p.step,
+            Parameter(_PREFIX + p.name, p.unit, -p.tolerance, p.tolerance, p.step,
                       EVERYDAY * p.tolerance) for p, _ in sizes)
         nuisances = copy(inner.nuisances)
         nuisances.extend(self._numbers)

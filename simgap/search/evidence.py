@@ -65,9 +65,7 @@ class Evidence:
         # what the nuisances have is that of all hypotheses, and their derivatives err
         occam = 0.5 * float(np.linalg.slogdet(scaled)[1]
                             - np.linalg.slogdet(scaled[np.ix_(shared, shared)])[1])
-        prior = 0.5 * float(state.x @ (prior_precision(state.parameters) * state.x))
-        return float(-(state.cost - prior) / self.temperature - prior - occam
-                     + self.log_prior(hypothesis))
+        return float(self.log_prior(hypothesis) - state.cost / self.temperature - occam)
 
     def _precision(self, state: FitState) -> FloatArray:
         """Return the precision of the priors; a size without one has that of a single sample."""

@@ -23,7 +23,6 @@ from simgap.fit.least_squares import LeastSquares
 from simgap.fit.noise import with_noise_left
 from simgap.fit.starts import with_initial_conditions
 from simgap.machine.contract import Form
-from simgap.machine.everyday import large_everyday
 from simgap.search import moves
 from simgap.search.evidence import Evidence, temperature
 from simgap.search.hypothesis import Hypothesis
@@ -113,12 +112,9 @@ class Search:
         """Yield moves that add what is promised most; what could not lead is not fitted."""
         problem, evidence, options = self._problem, self._evidence(), self._options
         own, top = evidence(base), evidence(self._ranked()[0])
-        large = large_everyday(base.state.parameters, base.state.x, options.large)
-        for place, (gain, item) in enumerate(screened(
-                problem, base.state, self._sensitivities, base.effects)):
-            # beside what is promised most, what is larger than it is every day
-            if (place < count or large & {p.name for p in item.form.sizes}) and (
-                    own + options.hope * gain / evidence.temperature > top):
+        for gain, item in screened(
+                problem, base.state, self._sensitivities, base.effects)[:count]:
+            if own + options.hope * gain / evidence.temperature > top:
                 yield partial(moves.added, problem, base, item)
         if scanning and not base.has_course and self._leaves_much(base):
             for item, sizes in scan(problem, base.state, self._sensitivities, base.effects):
@@ -154,7 +150,8 @@ class Search:
         """Expand the best hypotheses, then the best alone, until it has been expanded."""
         options = self._options
         expanded: dict[frozenset[str], float] = {}
-        for number in range(options.rounds):
+        number = 0
+        while number < options.rounds:
             self._progress(0.3 + 0.3 * number / options.rounds, 'several effects')
             ranked, evidence = self._ranked(), self._evidence()
             top = evidence(ranked[0])
@@ -168,6 +165,9 @@ class Search:
             leading = list(self._pool.map(
                 self._led, leading[:1 if number else options.leading]))
             self._keep(leading)
+            if self._lower_noise():
+                continue  # a fit that still gains has not ended: what it lacks is not known yet
+            number += 1
             # where little is left, derivatives say what is missing
             self._sensitivities = sensitivities(self._problem, leading[0].state, self._pool.map)
             for place, base in enumerate(leading):
@@ -223,14 +223,16 @@ class Search:
         """Return the problem with the misfit as noise, or the sensors' noise if it is small."""
         return self._problem.at_scale(level if level > self._options.strong else 1.0)
 
-    def _lower_noise(self) -> None:
-        """Lower the noise to what the best leaves, and fit the best again."""
+    def _lower_noise(self) -> bool:
+        """Lower the noise to what the best leaves, and fit the best again; return if it fell."""
+        lowered = False
         while True:
             ranked = self._ranked()
             best, before = ranked[0], self._problem.scale
             problem = self._at_noise(self._problem.noise_level(best.state.residual))
             if problem.scale > self._options.lower * before:
-                return
+                return lowered
+            lowered = True
             self._use(problem)
             self._sensitivities = rescaled(self._sensitivities, before / problem.scale)
             self._refit(best, [self._found[frozenset()], *(

@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from simgap.fit.least_squares import LeastSquares
 from simgap.machine.contract import Effect, Experiment, FloatArray, Form, Machine, Parameter, Point
 from simgap.machine.everyday import as_configured, EVERYDAY, taken_over, with_everyday
 from simgap.machine.nuisances import Nuisances
@@ -55,6 +56,15 @@ def test_each_size_has_a_nuisance_with_its_derivative() -> None:
         assert both[:, 0] == pytest.approx(0.01 + 0.02 * course, abs=1e-7)
         [[simulated]] = machine.simulate([{p.name: 0.02, 'zero': 0.01}])
         assert np.array_equal(simulated, both)  # type: ignore[arg-type]
+
+
+def test_an_everyday_size_stays_within_the_tolerance() -> None:
+    """What is larger is left for its effect to explain."""
+    machine = with_everyday(Table({'load.creep': 8.0 * TOLERANCE}))
+    problem = LeastSquares(machine)
+    state = problem.fit(problem.start(machine.nuisances, {}), 20)
+    assert state.value('everyday:load.creep.size') == pytest.approx(TOLERANCE)
+    assert problem.noise_level(state.residual) > 2.0
 
 
 def test_the_machine_is_as_it_was_beneath() -> None:
