@@ -75,10 +75,9 @@ class LeastSquares:
             z = np.nan_to_num(z, nan=bound, posinf=bound, neginf=-bound)
         return np.asarray(np.clip(z, -bound, bound, out=z))
 
-    def residuals(self, point: dict[str, float], alone: int | None = None) -> FloatArray:
-        """Return the residuals at a point, shape (n,); of one experiment if it is named."""
-        alone = self._alone if alone is None else alone
-        return self._row(self.machine.simulate([point], None if alone is None else [alone])[0])
+    def residuals(self, point: dict[str, float]) -> FloatArray:
+        """Return the residuals at a point, shape (n,)."""
+        return self._row(self.machine.simulate([point], [self._alone])[0])
 
     def residuals_at(self, points: Sequence[Point]) -> FloatArray:
         """Return the residuals at several points, simulated together, shape (points, n)."""
@@ -151,12 +150,6 @@ class LeastSquares:
         if jacobian is None:
             jacobian = self.jacobian(at, parameters, residual, central)
         return self._state(tuple(parameters), x, residual, jacobian, self.weights(residual))
-
-    def start_from(self, known: Sequence[Parameter], columns: Jacobian,
-                   others: Sequence[Parameter], point: dict[str, float]) -> FitState:
-        """Begin a fit at a point; the derivatives by `known` are given, the others taken."""
-        fresh = self.jacobian(point, others, self.residuals(point), central=True)
-        return self.start((*known, *others), point, np.column_stack([columns, fresh]))
 
     def refreshed(self, state: FitState) -> FitState:
         """Return the state with a fresh Jacobian and fresh weights."""

@@ -17,7 +17,7 @@ from simgap.fit.noise import with_model_error
 from simgap.fit.state import FitState, prior_precision, proper_precision
 from simgap.machine.contract import FloatArray, Machine, Parameter
 from simgap.machine.everyday import everyday_of
-from simgap.settings import DEFAULT, Settings
+from simgap.settings import DEFAULT
 
 # a size is found to this share of itself
 _SHARE = 0.01
@@ -36,8 +36,7 @@ class Confusability:
 
 
 def confusability(machine: Machine, progress: Callable[[float], None] = lambda share: None,
-                  settings: Settings = DEFAULT, inflated: float = 1.0,
-                  among: Collection[str] = ()) -> Confusability:
+                  inflated: float = 1.0, among: Collection[str] = ()) -> Confusability:
     """
     Say which effects the tests of a machine can tell apart, with the readings that it predicts.
 
@@ -45,7 +44,7 @@ def confusability(machine: Machine, progress: Callable[[float], None] = lambda s
     names the effects that are judged; empty for all.
     """
     problem = LeastSquares(machine.with_experiments(
-        with_model_error(machine.experiments, settings.noise)), settings=settings)
+        with_model_error(machine.experiments, DEFAULT.noise)))
     return visibility(problem, problem.start(machine.nuisances, {}), progress, inflated, among)
 
 

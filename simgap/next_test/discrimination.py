@@ -15,11 +15,11 @@ from simgap.machine.contract import FloatArray, Machine, Parameter, Point
 from simgap.next_test.rivals import known_to, numbers_of
 from simgap.next_test.separation import LEAST, prior_of, Separation
 from simgap.search.rival import Rival
-from simgap.settings import DEFAULT, Settings
+from simgap.settings import DEFAULT
 
 
 def separation(machine: Machine, rivals: Sequence[Rival], inflated: float,
-               settings: Settings = DEFAULT, follow: bool = True) -> Separation:
+               follow: bool = True) -> Separation:
     """
     Return how well the planned tests of a machine would tell rivals apart, to first order.
 
@@ -28,7 +28,7 @@ def separation(machine: Machine, rivals: Sequence[Rival], inflated: float,
     catalogue lacks an effect or a form.
     """
     points = [known_to(machine, rival) for rival in rivals]
-    problem = planned(machine, rivals, points, settings)
+    problem = planned(machine, rivals, points)
     residuals = np.array([problem.residuals(point) for point in points])
     prior, lack = prior_of(rivals), np.zeros((len(rivals), len(rivals)))
     channels = problem.experiments[0].channels
@@ -46,10 +46,10 @@ def separation(machine: Machine, rivals: Sequence[Rival], inflated: float,
 
 
 def deviations(machine: Machine, rival: Rival, inflated: float,
-               settings: Settings = DEFAULT) -> tuple[tuple[str, ...], FloatArray, FloatArray]:
+               ) -> tuple[tuple[str, ...], FloatArray, FloatArray]:
     """Return a rival's m names, and their covariances before and after tests, shape (m, m)."""
     point = known_to(machine, rival)
-    problem = planned(machine, [rival], [point], settings)
+    problem = planned(machine, [rival], [point])
     numbers = numbers_of(machine, rival)
     jacobian = problem.jacobian(point, numbers, problem.residuals(point), central=False)
     known = (jacobian.T @ jacobian).astype(float) + _precision(rival, numbers, inflated)
@@ -62,15 +62,13 @@ def deviations(machine: Machine, rival: Rival, inflated: float,
             np.asarray(inflated * inverse[np.ix_(places, places)]))
 
 
-def planned(machine: Machine, rivals: Sequence[Rival], points: Sequence[Point],
-            settings: Settings) -> LeastSquares:
+def planned(machine: Machine, rivals: Sequence[Rival], points: Sequence[Point]) -> LeastSquares:
     """Return the planned tests as the likeliest rival makes them, with a model's usual error."""
     likeliest = int(np.argmax([rival.probability for rival in rivals]))
     [readings] = machine.simulate([points[likeliest]])
     experiments = [replace(e, measured=values) for e, values in zip(
         machine.experiments, readings, strict=True) if values is not None]
-    return LeastSquares(machine.with_experiments(with_model_error(experiments, settings.noise)),
-                        settings=settings)
+    return LeastSquares(machine.with_experiments(with_model_error(experiments, DEFAULT.noise)))
 
 
 def _followed(problem: LeastSquares, rival: Rival, point: dict[str, float], off: FloatArray,

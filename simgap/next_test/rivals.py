@@ -14,10 +14,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from simgap.fit.least_squares import LeastSquares
 from simgap.machine.contract import Machine, Parameter
 from simgap.search.rival import Rival
-from simgap.settings import Settings
+from simgap.settings import DEFAULT, Settings
 from simgap.verdict.intervals import covariance
 from simgap.verdict.verdict import Answer
 
@@ -37,7 +36,7 @@ class Findings:
     # remainder is spread over the whole catalogue
     unnamed: Mapping[str, float] = field(default_factory=dict)
 
-    def are_open(self, settings: Settings) -> bool:
+    def are_open(self, settings: Settings = DEFAULT) -> bool:
         """
         Return whether there are answers to tell apart: several, and none of them sure.
 
@@ -80,8 +79,7 @@ def numbers_of(machine: Machine, rival: Rival) -> list[Parameter]:
     return [*machine.nuisances, *(p for form in rival.forms_of(machine) for p in form.parameters)]
 
 
-def rivals_of(problem: LeastSquares, answers: Sequence[Answer], inflated: float,
-              settings: Settings) -> list[Rival]:
+def rivals_of(answers: Sequence[Answer], inflated: float, settings: Settings) -> list[Rival]:
     """Return the likeliest of sorted answers with what is known of their numbers."""
     found = []
     for answer in answers[:settings.verdict.largest_group]:

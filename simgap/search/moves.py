@@ -4,15 +4,13 @@
 The moves of the search: each makes another hypothesis of one, and fits it from where that ended.
 
 An effect is added, dropped, exchanged for one in another place or of another form, split into its
-parts or joined from them. A move takes
-fresh derivatives by the numbers of the effects alone; those by the nuisances are those of the
-hypothesis that it began with.
+parts or joined from them. A move takes fresh derivatives by the numbers of the effects alone;
+those by the nuisances are those of the hypothesis that it began with.
 """
 
 from collections.abc import Sequence
 from dataclasses import replace
 from statistics import fmean
-from typing import TypeVar
 
 import numpy as np
 from simgap.fit import starts
@@ -22,8 +20,6 @@ from simgap.machine import everyday
 from simgap.machine.contract import Form, Point
 from simgap.search.hypothesis import Hypothesis
 from simgap.search.screening import Sensitivity
-
-Item = TypeVar('Item')
 
 
 def added(problem: LeastSquares, base: Hypothesis, item: Sensitivity,
@@ -39,17 +35,11 @@ def added(problem: LeastSquares, base: Hypothesis, item: Sensitivity,
 
 def dropped(problem: LeastSquares, base: Hypothesis, effect: str) -> Hypothesis:
     """Return a hypothesis with one effect less; the nuisances take over what they can of it."""
-    place = base.effects.index(effect)
-    gone = base.forms[place]
-    values = base.state.point()
-    kept = _others(base, gone)
-    names = {base.state.parameters[j].name for j in kept}
+    gone, values = base.parameters_of([effect]), base.state.point()
     point = problem.machine.nuisances.absorb(
-        {name: value for name, value in values.items() if name in names},
-        {p.name: values[p.name] for p in gone.parameters})
-    none = np.zeros((base.state.residual.size, 0), np.float32)
-    return _fitted(problem, _without(base.effects, place), _without(base.forms, place), base,
-                   kept, [], none, point)
+        {name: value for name, value in values.items() if name not in gone},
+        {name: values[name] for name in values if name in gone})
+    return _replaced(problem, base, [effect], (), (), point)
 
 
 def exchanged(problem: LeastSquares, base: Hypothesis, effect: str, other: str,
@@ -175,13 +165,3 @@ def _columns(problem: LeastSquares, forms: Sequence[Form], point: Point) -> Jaco
     at = dict(point)
     return problem.jacobian(at, [p for form in forms for p in form.parameters],
                             problem.residuals(at), central=True)
-
-
-def _others(base: Hypothesis, form: Form) -> list[int]:
-    """Return which of a hypothesis' parameters are not a form's."""
-    gone = {p.name for p in form.parameters}
-    return [j for j, p in enumerate(base.state.parameters) if p.name not in gone]
-
-
-def _without(items: tuple[Item, ...], place: int) -> tuple[Item, ...]:
-    return items[:place] + items[place + 1:]

@@ -62,7 +62,7 @@ class Search:
         self._pool = ThreadPoolExecutor(threads)
         self._whole, self._progress, self._earlier = whole, progress, earlier
         self._options = whole.settings.search
-        self._use(LeastSquares(whole.machine.truncated(), settings=whole.settings))
+        self._problem = LeastSquares(whole.machine.truncated(), settings=whole.settings)
         self._found: dict[frozenset[str], Hypothesis] = {}
         self._sensitivities: list[Sensitivity] = []
 
@@ -81,9 +81,6 @@ class Search:
         return self._compared()
 
     # -- the hypotheses ------------------------------------------------------------------------
-
-    def _use(self, problem: LeastSquares) -> None:
-        self._problem = problem
 
     def _keep(self, hypotheses: Iterable[Hypothesis | None]) -> None:
         """Keep hypotheses; of those with the same effects the better one."""
@@ -196,7 +193,7 @@ class Search:
         nuisances, iterations = self._problem.machine.nuisances, self._options.iterations
         point = with_initial_conditions(self._problem, self._beginning())
         first = self._problem.start(nuisances, point)
-        self._use(self._at_noise(self._problem.noise_level(first.residual)))
+        self._problem = self._at_noise(self._problem.noise_level(first.residual))
         state = self._problem.start(nuisances, point, first.jacobian / self._problem.scale)
         for _ in range(self._options.rounds):
             state = self._problem.fit(state, iterations)
@@ -206,7 +203,7 @@ class Search:
             if level > self._options.lower * scale and (
                     scale > 1.0 or before - state.cost < self._options.settled * before):
                 break
-            self._use(self._at_noise(level))
+            self._problem = self._at_noise(level)
             state = self._problem.start(
                 nuisances, with_initial_conditions(self._problem, state.point()))
         return Hypothesis((), (), state)
@@ -233,7 +230,7 @@ class Search:
             if problem.scale > self._options.lower * before:
                 return lowered
             lowered = True
-            self._use(problem)
+            self._problem = problem
             self._sensitivities = rescaled(self._sensitivities, before / problem.scale)
             self._refit(best, [self._found[frozenset()], *(
                 h for h in ranked if h.effects)][:1 + self._options.finalists])
@@ -280,15 +277,15 @@ class Search:
         best, none = ranked[0], self._found[frozenset()]
         chosen = [h for h in ranked if h.effects][:options.finalists]
         # the motion that was found may make readings noisier than the model without effects
-        self._use(LeastSquares(self._whole.machine.with_noise_at(best.state.point()),
-                               settings=self._whole.settings))
+        settings = self._whole.settings
+        self._problem = LeastSquares(
+            self._whole.machine.with_noise_at(best.state.point()), settings=settings)
         self._refit(best, [best])
         best = self._found[frozenset(best.effects)]
-        settings = self._whole.settings
         point = best.state.point()
-        self._use(LeastSquares(with_noise_left(
+        self._problem = LeastSquares(with_noise_left(
             self._problem.machine.linearised_at(point), point, settings.noise,
-            settings.noise.greatest_level), settings=settings))
+            settings.noise.greatest_level), settings=settings)
         self._refit(best, [best, none, *(h for h in chosen if h.effects != best.effects)])
         judged: set[frozenset[str]] = set()
         while frozenset((best := self._ranked()[0]).effects) not in judged:

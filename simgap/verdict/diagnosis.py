@@ -22,6 +22,7 @@ from simgap.verdict.intervals import values_with_intervals
 from simgap.verdict.interventions import interventions
 from simgap.verdict.lack_of_fit import remainders, residual_tests
 from simgap.verdict.record import Named, Verdict
+from simgap.verdict.unknown_input import components
 
 Progress = Callable[[float, str], None]
 
@@ -53,14 +54,14 @@ def _diagnose(machine: Machine, progress: Progress, threads: int, settings: Sett
     problem, decision = found.found.problem, found.decision
     none, best, inflated = found.found.none, found.found.best, found.found.evidence.temperature
     unsure = decision.word == 'unknown_effect' or decision.unknown >= settings.verdict.partly
-    parts = localisation.components(found.places, settings.localisation.caution)
+    parts = components(found.places, settings.localisation.caution)
     located: Sequence[localisation.Located] = ()
     if decision.word == 'unknown_effect':
         located = localisation.of_the_unknown(problem, none.state, parts)
     elif decision.word in ('explained', 'partly_explained'):
         located = localisation.of_effects(problem, decision.answers, none.state, best.state)
     findings = Findings(
-        rivals_of(problem, decision.answers, inflated, settings), inflated,
+        rivals_of(decision.answers, inflated, settings), inflated,
         found_noise(problem.experiments),
         unnamed={part: decision.unknown * share for part, share in parts.items()
                  if decision.unknown * share >= settings.verdict.least_probability})

@@ -77,16 +77,16 @@ class Judge:
                         key=lambda trial: problem.loss(problem.residuals(trial)))
         added = part.parameters([p for p in self._best.state.parameters
                                  if p.name in self._effects])
-        found = settled(problem, problem.fit(
-            problem.start_from(unaided.parameters, unaided.jacobian, added, point),
-            self._settings.search.iterations), 1)
+        fresh = problem.jacobian(point, added, problem.residuals(point), central=True)
+        start = problem.start((*unaided.parameters, *added), point,
+                              np.column_stack([unaided.jacobian, fresh]))
+        found = settled(problem, problem.fit(start, self._settings.search.iterations), 1)
         of_all = {name: value for name, value in self._best.state.point().items()
                   if name in {p.name for p in found.parameters}}
         if problem.start(found.parameters, of_all, found.base_jacobian).cost < (
                 found.cost - self._settings.evidence.number):
             found = settled(problem, self._fitted(
-                part, self._best.state.parameters, of_all, self._with),
-                1)
+                part, self._best.state.parameters, of_all, self._with), 1)
         return problem, unaided, found
 
     def _undetermined(self, problem: LeastSquares, unaided: FitState, found: FitState,

@@ -11,14 +11,10 @@ from simgap.fit.least_squares import LeastSquares
 from simgap.fit.state import FitState
 from simgap.machine.contract import FloatArray
 from simgap.settings import DEFAULT, LocalisationSettings
-from simgap.verdict.unknown_input import components
 from simgap.verdict.verdict import Answer
 
-__all__ = ['Located', 'components', 'of_effects', 'of_the_unknown']
 Located = dict[str, Any]
-# A loud residual has so many times the variance of the rest; each is at least this share of a
-# test; its ends are sought at so many places.
-# Places of a test at which what is loud may begin or end.
+# Places of a test at which what is loud may begin or end: their pairs are all tried.
 _PLACES = 800
 
 
