@@ -15,6 +15,7 @@ from typing import Any
 
 from antenna_drive.diagnosis.drive_limits import CHANNELS, DriveLimits
 from antenna_drive.diagnosis.excitation import SheetCommand
+from antenna_drive.diagnosis.field_recording import SAMPLE_RATE
 from antenna_drive.diagnosis.machine import AntennaMachine
 from antenna_drive.diagnosis.planned_tests import planned
 from antenna_drive.parameters.sets import Drive
@@ -151,18 +152,17 @@ class AntennaTests(TestSpace):
     drive : the configuration
     limits : of the drive
     duration : of a test [s]
-    rate : at which it is simulated, samples per second [Hz]
     """
 
     families = tuple(FAMILIES)
 
     def __init__(self, base: TestSheet, drive: Drive, limits: DriveLimits,
-                 duration: float = 30.0, rate: float = 70.0) -> None:
+                 duration: float = 30.0) -> None:
         """Take what all the tests have in common."""
         # the waveform is what is looked for; a proposal is a test from rest
         self._base = replace(base, waveform=None, start='rest')
         self._drive, self._limits = drive, limits
-        self._duration, self._rate = duration, rate
+        self._duration = duration
         self.limits = limits.as_data()
 
     def draw(self, family: str, random: np.random.Generator) -> TestSheet:
@@ -196,7 +196,7 @@ class AntennaTests(TestSpace):
 
     def machine(self, test: Any) -> AntennaMachine:
         """Return the drive in one test."""
-        return AntennaMachine({'next': planned(test, self._duration, self._rate)}, self._drive,
+        return AntennaMachine({'next': planned(test, self._duration, SAMPLE_RATE)}, self._drive,
                               threads=1)
 
     def use(self, machine: Machine, points: Sequence[Point]) -> Mapping[str, float]:

@@ -74,8 +74,7 @@ def correct(drive: Drive, records: Sequence[np.ndarray[Any, np.dtype[Any]]],
     """
     given = _as_all_tests_have_it(drive, records)
     point = hypothesis.state.point()
-    owner = {p.name: effect for effect, form in zip(hypothesis.effects, hypothesis.forms,
-                                                    strict=True) for p in form.parameters}
+    owner = {p.name: effect for effect, form in hypothesis.items for p in form.parameters}
     fitted = [(p, point[p.name]) for p in hypothesis.state.parameters
               if isinstance(p, AntennaParameter) and point[p.name] != 0.0]
     written, recorder, missing = _written(given, fitted)

@@ -52,6 +52,8 @@ SHORTEST_STEP = 7e-4
 _STIFF = ('hysteresis', 'hysteresis_share')
 # An encoder's digit differs from the sheet's if it is larger by this factor.
 _COARSER = 1.3
+# Of the parameters, where no sheet gives it.
+_TOLERANCE = 0.02
 # Runs that are kept.
 _KEPT_RUNS = 24
 
@@ -80,7 +82,6 @@ class AntennaMachine(Machine):
     recordings : of one machine, by name
     drive : the configuration
     threads : how many runs at once
-    tolerance : of the parameters, where no sheet gives it
 
     Raises UserError: a recording lacks its rate command or has no reading to compare.
     """
@@ -91,8 +92,8 @@ class AntennaMachine(Machine):
     diagram = DIAGRAM
     advice = ADVICE
 
-    def __init__(self, recordings: Mapping[str, Recording], drive: Drive, threads: int = 2,
-                 tolerance: float = 0.02) -> None:
+    def __init__(self, recordings: Mapping[str, Recording], drive: Drive,
+                 threads: int = 2) -> None:
         """Prepare the tests and take the sensors' noise from a first run."""
         # one thread needs no other, and no time to hand over to it
         self._map = ThreadPoolExecutor(threads).map if threads > 1 else map
@@ -110,11 +111,10 @@ class AntennaMachine(Machine):
         given = [recording.sheet.parameter_tolerance for recording in recordings.values()
                  if recording.sheet.parameter_tolerance is not None]
         if not given:
-            notes.append(f'no sheet gives parameter_tolerance: {tolerance:g} assumed')
+            notes.append(f'no sheet gives parameter_tolerance: {_TOLERANCE:g} assumed')
         self.notes = notes
-        self.tolerance = max(given, default=tolerance)
         self._digit = _coarser_digit(self._tests)
-        tolerances = nuisances(self._tests, self.tolerance)
+        tolerances = nuisances(self._tests, max(given, default=_TOLERANCE))
         effects = catalogue([float(test.time[-1]) for test in self._tests], self._digit)
         self.words = words(effects.values(), drive, self._tests[0].record)
         modifiers = KnownModifiers()

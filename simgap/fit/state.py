@@ -46,11 +46,10 @@ class FitState:
         return updated_product(self.base_jacobian, self.broyden_errors,
                                self.broyden_directions, self.weight)
 
-    def without_jacobian(self, keep_hessian: bool = False) -> FitState:
+    def without_jacobian(self) -> FitState:
         """Return the state without its Jacobian, which takes most of the memory."""
         return FitState(self.parameters, self.x, self.residual, np.empty((0, 0), np.float32),
-                        self.weight, self.cost,
-                        kept_hessian=self.hessian if keep_hessian else None)
+                        self.weight, self.cost, kept_hessian=self.hessian)
 
     def point(self) -> dict[str, float]:
         """Return the values by name."""

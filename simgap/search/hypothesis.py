@@ -26,6 +26,11 @@ class Hypothesis:
         return self.state.cost
 
     @property
+    def items(self) -> list[tuple[str, Form]]:
+        """Return the effects with their forms."""
+        return list(zip(self.effects, self.forms, strict=True))
+
+    @property
     def values(self) -> list[tuple[Parameter, float]]:
         """Return the parameters of the effects with their values."""
         point = self.state.point()
@@ -35,13 +40,13 @@ class Hypothesis:
     def named(self) -> tuple[str, ...]:
         """Return the effects that are larger than on a machine in good order."""
         point = self.state.point()
-        return tuple(effect for effect, form in zip(self.effects, self.forms, strict=True)
+        return tuple(effect for effect, form in self.items
                      if any(abs(point[p.name]) > p.tolerance for p in form.sizes))
 
     def parameters_of(self, effects: Collection[str]) -> set[str]:
         """Return the names of the parameters of some of its effects."""
-        return {p.name for effect, form in zip(self.effects, self.forms, strict=True)
-                if effect in effects for p in form.parameters}
+        return {p.name for effect, form in self.items if effect in effects
+                for p in form.parameters}
 
     @property
     def has_course(self) -> bool:
@@ -56,4 +61,4 @@ class Hypothesis:
 
     def without_jacobian(self) -> Hypothesis:
         """Return the hypothesis without its Jacobian, which takes most of the memory."""
-        return replace(self, state=self.state.without_jacobian(keep_hessian=True))
+        return replace(self, state=self.state.without_jacobian())

@@ -132,8 +132,7 @@ def led(problem: LeastSquares, base: Hypothesis) -> Hypothesis:
 def _replaced(problem: LeastSquares, base: Hypothesis, gone: Sequence[str], names: Sequence[str],
               forms: Sequence[Form], point: Point) -> Hypothesis:
     """Fit effects in the place of others, from a point."""
-    left = [(effect, form) for effect, form in zip(base.effects, base.forms, strict=True)
-            if effect not in gone]
+    left = [(effect, form) for effect, form in base.items if effect not in gone]
     kept = [j for j, p in enumerate(base.state.parameters)
             if p.name not in base.parameters_of(gone)]
     return _fitted(problem, (*(effect for effect, _ in left), *names),

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-import math
 from typing import Any
 
 import numpy as np
@@ -14,8 +13,6 @@ from simgap.machine.contract import FloatArray, Form, Machine
 
 # Digits of a covariance in a file: a number's deviation is known to a few percent at best.
 _DIGITS = 5
-# No variance is less than this.
-_LEAST = 1e-30
 
 
 @dataclass(frozen=True)
@@ -47,11 +44,6 @@ class Rival:
         except KeyError:
             return False
         return True
-
-    def deviation(self, name: str) -> float:
-        """Return the standard deviation of one of the values."""
-        place = self.names.index(name)
-        return math.sqrt(max(float(self.covariance[place, place]), _LEAST))
 
     def covariance_of(self, names: Sequence[str]) -> FloatArray:
         """Return the covariance of some of the values."""

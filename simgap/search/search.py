@@ -261,7 +261,7 @@ class Search:
                 name: value for name, value in rival.point.items()
                 if name in names or name in none.state.point()}}
             numbers = (*machine.nuisances, *(p for form in forms for p in form.parameters))
-            state = replace(none.state.without_jacobian(), parameters=numbers,
+            state = replace(none.state, parameters=numbers,
                             x=np.array([point.get(p.name, p.start) for p in numbers]))
             found.append(moves.refitted(
                 self._problem, Hypothesis(rival.effects, forms, state), none, slopes))

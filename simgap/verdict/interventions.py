@@ -78,8 +78,7 @@ def _effects(numbers: Sequence[Mapping[str, Any]], differ: bool) -> list[str]:
 
 def _numbers(problem: LeastSquares, machine: ByLabel, best: Hypothesis,
              key: str) -> list[dict[str, Any]]:
-    bases = {effect: machine.labels.base_of(form) for effect, form in zip(
-        best.effects, best.forms, strict=True)}
+    bases = {effect: machine.labels.base_of(form) for effect, form in best.items}
     chosen = {effect: machine.labels.split(form, key) for effect, form in bases.items()
               if can_be_split(form)}
     groups = machine.labels.groups[key]
@@ -89,8 +88,7 @@ def _numbers(problem: LeastSquares, machine: ByLabel, best: Hypothesis,
     start = {p.name: point[value][base.name] for effect, form in chosen.items()
              for value in values for base, p in zip(
                  bases[effect].sizes, _of_value(form, key, value), strict=True)}
-    forms = [chosen.get(effect, form) for effect, form in zip(
-        best.effects, best.forms, strict=True)]
+    forms = [chosen.get(effect, form) for effect, form in best.items]
     state = _fitted(problem, best, forms, {**point[values[0]], **best.state.point(), **start})
     found = []
     for effect, form in chosen.items():

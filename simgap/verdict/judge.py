@@ -16,7 +16,7 @@ from simgap.machine.contract import FloatArray, Form, Machine, Parameter
 from simgap.search.hypothesis import Hypothesis
 from simgap.settings import Settings
 from simgap.verdict.intervals import covariance, inflation
-from simgap.verdict.part import Part, Slopes
+from simgap.verdict.part import Part
 
 
 @dataclass(frozen=True)
@@ -46,26 +46,27 @@ class Judge:
         self._groups = groups
         self._settings: Settings = problem.settings
         self._none, self._best = (h.with_jacobian(problem) for h in (none, best))
-        self._without, self._with = (Slopes.of(problem, h.state)
-                                     for h in (self._none, self._best))
         self._start = {name: value for form in best.forms for name, value in form.start.items()}
         self._effects = {p.name for form in best.forms for p in form.parameters}
         self._nuisances = [p for p in best.state.parameters if p.name not in self._effects]
 
     def _fitted(self, part: Part, numbers: Sequence[Parameter], begin: Mapping[str, float],
-                slopes: Slopes) -> FitState:
-        """Fit some numbers to a part of the tests, from where the fit to all of them ended."""
+                of_all: Hypothesis) -> FitState:
+        """Fit some numbers to a part of the tests, with the derivatives of a fit to all."""
         # Where it begins has seen what is withheld; where it ends, the part alone decides. What
         # the part does not determine is not judged, see `_undetermined`.
-        own = part.parameters(numbers)
+        own, whole = part.parameters(numbers), of_all.state.jacobian
+        column = {p.name: j for j, p in enumerate(of_all.state.parameters)}
+        slopes = np.concatenate([whole[self._problem.rows(k)] for k in part.chosen])[
+            :, [column[p.name] for p in own]]
         problem = LeastSquares(part, settings=self._settings)
-        start = problem.start(own, dict(begin), slopes.for_part(part, own))
+        start = problem.start(own, dict(begin), slopes)
         return problem.fit(start, self._settings.search.iterations)
 
     def _trained(self, part: Part) -> tuple[LeastSquares, FitState, FitState]:
         """Return a part's problem, and its fits without and with the effects."""
         unaided = self._fitted(part, self._none.state.parameters, self._none.state.point(),
-                               self._without)
+                               self._none)
         problem = LeastSquares(part, settings=self._settings)
         if not self._best.effects:
             return problem, unaided, unaided
@@ -86,7 +87,7 @@ class Judge:
         if problem.start(found.parameters, of_all, found.base_jacobian).cost < (
                 found.cost - self._settings.evidence.number):
             found = settled(problem, self._fitted(
-                part, self._best.state.parameters, of_all, self._with), 1)
+                part, self._best.state.parameters, of_all, self._best), 1)
         return problem, unaided, found
 
     def _undetermined(self, problem: LeastSquares, unaided: FitState, found: FitState,
@@ -98,7 +99,7 @@ class Judge:
         price = self._settings.evidence.number
         gain = unaided.cost - found.cost
         reasons = {}
-        for effect, form in zip(self._best.effects, self._best.forms, strict=True):
+        for effect, form in self._best.items:
             if form.is_course or any(p.experiment is not None for p in form.parameters):
                 reasons[effect] = 'its numbers belong to one test alone'
             elif gain < price:
@@ -115,7 +116,7 @@ class Judge:
         """Return the reasons why effects cannot be judged whose label training does not have."""
         [test] = testing.experiments
         reasons = {}
-        for effect, form in zip(self._best.effects, self._best.forms, strict=True):
+        for effect, form in self._best.items:
             for key, value in {p.label for p in form.parameters if p.label}:
                 if test.labels.get(key, '') == value and not any(
                         e.labels.get(key, '') == value for e in training.experiments):
@@ -127,7 +128,7 @@ class Judge:
         machine, groups = self._problem.machine, self._groups
         testing = Part(machine, [k])
         bare = self._fitted(testing, self._none.state.parameters, self._none.state.point(),
-                            self._without)
+                            self._none)
         problem = LeastSquares(testing, settings=self._settings)
         fold = self._fold(k, _gap(testing, bare.point()), problem.residuals_of(bare, 0))
         if not self._best.effects:
@@ -149,7 +150,7 @@ class Judge:
         begin = min((self._best.state.point(), {**bare.point(), **found.point()}),
                     key=lambda point: following.loss(
                         following.residuals({name: point[name] for name in own})))
-        state = self._fitted(holding, self._nuisances, begin, self._with)
+        state = self._fitted(holding, self._nuisances, begin, self._best)
         point = {**held, **state.point()}
         fold = replace(fold, reasons={**reasons, **self._unseen(problem, point, state.residual,
                                                                 reasons)})
@@ -182,8 +183,7 @@ class Judge:
         numbers = self._numbers(reasons)
         if not numbers:
             return fold
-        left_out = {p.name for effect, form in zip(self._best.effects, self._best.forms,
-                                                   strict=True)
+        left_out = {p.name for effect, form in self._best.items
                     if effect in reasons for p in form.sizes}
         point = {**found.point(), **dict.fromkeys(left_out, 0.0)}
         residual = own.residuals(point)
@@ -196,7 +196,7 @@ class Judge:
         # A limit that a test does not reach changes nothing there, whatever its derivative says.
         # `residual` is that at the point.
         unseen = {}
-        for effect, form in zip(self._best.effects, self._best.forms, strict=True):
+        for effect, form in self._best.items:
             if effect not in reasons:
                 without = problem.residuals({**point, **{p.name: 0.0 for p in form.sizes}})
                 if 0.5 * float(np.sum(np.square(residual - without))) < (
@@ -205,7 +205,7 @@ class Judge:
         return unseen
 
     def _numbers(self, reasons: Mapping[str, str]) -> list[Parameter]:
-        return [p for effect, form in zip(self._best.effects, self._best.forms, strict=True)
+        return [p for effect, form in self._best.items
                 if effect not in reasons for p in form.parameters]
 
     def _fold(self, k: int, gap: FloatArray, before: FloatArray) -> Withheld:

@@ -5,14 +5,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 import math
 from types import MappingProxyType
 
-import numpy as np
-from simgap.fit.broyden import Jacobian
-from simgap.fit.least_squares import LeastSquares
-from simgap.fit.state import FitState
 from simgap.machine.contract import (
     Experiment, FloatArray, Machine, Nuisances, Parameter, Point, TimeScales,
 )
@@ -63,24 +59,3 @@ class Part(Machine):
         return tuple(p if p.experiment is None else
                      replace(p, experiment=self.chosen.index(p.experiment))
                      for p in of if p.experiment is None or p.experiment in self.chosen)
-
-
-@dataclass(frozen=True)
-class Slopes:
-    """Derivatives that were taken once for all experiments, to begin fits with."""
-
-    parameters: tuple[Parameter, ...]  # what the columns belong to
-    rows: tuple[slice, ...]  # of each experiment
-    jacobian: Jacobian  # at the sensors' own noise, shape (n, m)
-
-    @classmethod
-    def of(cls, problem: LeastSquares, state: FitState) -> Slopes:
-        """Take the derivatives of a fit to all experiments."""
-        return cls(state.parameters, tuple(map(problem.rows, range(len(problem.experiments)))),
-                   state.jacobian)
-
-    def for_part(self, part: Part, parameters: Sequence[Parameter]) -> Jacobian:
-        """Return the rows of a part and the columns of some parameters, in their order."""
-        column = {p.name: j for j, p in enumerate(self.parameters)}
-        return np.concatenate([self.jacobian[self.rows[k]] for k in part.chosen])[
-            :, [column[p.name] for p in parameters]]
