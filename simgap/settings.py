@@ -55,7 +55,8 @@ class SearchSettings:
     adds: int = _at(10, '1', 'forms that are fitted after the first screening', YARDSTICK)
     leading: int = _at(3, '1', 'hypotheses that are expanded first', YARDSTICK)
     partners: int = _at(5, '1', 'effects that are added to each of them', YARDSTICK)
-    rounds: int = _at(4, '1', 'greatest number of times that the best are expanded')
+    rounds: int = _at(
+        4, '1', 'greatest number of times that the best are expanded, and of effects')
     hope: float = _at(
         2.0, '1', 'multiple of the promised gain that has to beat the best: a derivative may err')
     strong: float = _at(

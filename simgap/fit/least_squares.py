@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from simgap.fit.broyden import Jacobian
 from simgap.fit.levenberg_marquardt import LevenbergMarquardt
 from simgap.fit.noise import whitened
-from simgap.fit.robust_loss import robust_loss, robust_weight
+from simgap.fit.robust_loss import robust_level, robust_loss, robust_weight
 from simgap.fit.state import FitState, point_of, prior_precision
 from simgap.machine.contract import FloatArray, Machine, Parameter, Point
 from simgap.settings import DEFAULT, Settings
@@ -88,11 +88,7 @@ class LeastSquares:
 
     def noise_level(self, residual: FloatArray) -> float:
         """Return the size of residuals in standard deviations of the noise, outliers clipped."""
-        z = np.abs(residual[self.valid]) * self.scale
-        level = float(np.sqrt(np.mean(z ** 2)))
-        for _ in range(10):
-            level = float(np.sqrt(np.mean(np.minimum(z, self.settings.fit.outlier * level) ** 2)))
-        return level
+        return robust_level(residual[self.valid] * self.scale, self.settings.fit.outlier)
 
     def jacobian(self, point: dict[str, float], parameters: Sequence[Parameter],
                  residual: FloatArray, central: bool,

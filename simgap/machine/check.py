@@ -2,11 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Whether a machine keeps its contract: what is missing or wrong is named before a fit."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 import math
 
 import numpy as np
 from simgap.errors import UserError
+from simgap.inputs.schema import nearest
 from simgap.machine.effect import Effect, Form, Parameter
 from simgap.machine.experiment import Experiment
 from simgap.machine.machine import Machine
@@ -55,6 +56,18 @@ def check_tests(machine: Machine) -> None:
                for item, readings in zip(machine.experiments, machine.simulate([{}])[0],
                                          strict=True)):
         raise UserError(names + AT_REST)
+
+
+def without(machine: Machine, effects: Sequence[str], limits: Iterable[str]) -> Machine:
+    """Return a machine without some effects; UserError names one, or a limit, that it lacks."""
+    signals = machine.experiments[0].channels
+    for kind, names, known in (('effect', effects, [*machine.catalogue]),
+                               ('signal', limits, signals)):
+        for name in names:
+            if name not in known:
+                raise UserError(f'{name}: no such {kind}{nearest(name, known)}; there are '
+                                + ', '.join(known))
+    return machine.without(effects)
 
 
 def moves(experiment: Experiment, readings: np.ndarray | None,  # type: ignore[type-arg]

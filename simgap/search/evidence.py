@@ -11,11 +11,12 @@ Gauss-Newton Hessian H, the precision P of the priors and the values x at the en
 
 less the same determinant of the nuisances alone, which all hypotheses have and whose derivatives
 differ by their errors.
+
 A size without a prior has one as wide as a single mean sample would tell (R. E. Kass,
 L. Wasserman, Journal of the American Statistical Association 90, 928, 1995), so that its price
-does not turn with its bounds; a shape has an even one within them. T is what a sample counts less
-because residuals are loud or correlated. Each effect has to gain, for itself, what shows an
-effect beside all that a model leaves out.
+does not turn with its bounds; a shape has an even one within them. T is by how much less than one
+a sample counts, because residuals are loud or correlated. Each effect has to gain, for itself,
+what shows an effect beside all that a model leaves out.
 
 No form of an effect is exact. What a further effect gains has to exceed the share of the whole
 gain that an error of form leaves. Where all effects have everyday sizes, these carry such errors,
