@@ -4,7 +4,7 @@
 Every threshold of the diagnosis: its unit, what it decides, and the trial that set it.
 
 Trials are in lab/notebook/history.md. 'Practice cases' came before the first sealed trial;
-'design' means without any.
+'design' means without any. The first sketch of the search is in lab/notebook/one-search.md.
 """
 
 from __future__ import annotations

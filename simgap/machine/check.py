@@ -142,11 +142,9 @@ def _check_parameter(kind: str, item: Parameter, experiments: int) -> None:
     if not item.low <= (item.start if item.is_shape else 0.0) <= item.high:
         neutral = f'its start {item.start:g}' if item.is_shape else 'the neutral value 0'
         raise MachineError(f'{name}: bounds {item.low:g} to {item.high:g} without {neutral}')
-    # a prior may stand for bounds, in both directions
-    if not (math.isfinite(item.low) and math.isfinite(item.high) or item.prior_sigma > 0.0
-            and math.isinf(item.low) and math.isinf(item.high)):
+    if not (math.isfinite(item.low) and math.isfinite(item.high)):
         raise MachineError(f'{name}: bounds {item.low:g} to {item.high:g} given, allowed are '
-                           'finite ones, or none at all beside a prior_sigma')
+                           'finite ones')
     if not 0.0 < item.step < math.inf:
         raise MachineError(f'{name}: step: {item.step:g} given, allowed is a number above 0')
     if not 0.0 <= item.prior_sigma < math.inf:

@@ -14,8 +14,7 @@ class Parameter:
     A number in which the machine may differ from its model; zero is the model as configured.
 
     name : unique in its machine
-    low, high : hard bounds in `unit`, with zero between them; both infinite for a nuisance whose
-        prior does for them
+    low, high : hard bounds in `unit`, with zero between them
     step : of the difference quotient, in the unit of the value
     prior_sigma : standard deviation of a Gaussian prior about zero; 0 for no prior
     experiment : index of the one experiment that it acts on; None for all

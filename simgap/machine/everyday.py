@@ -5,9 +5,9 @@ A machine with a little of each effect, as every machine has it.
 
 No size is exactly zero. Up to the tolerance of its catalogue an effect is no fault, but it shows,
 and what shows and has no name would be taken for another effect. So each has a nuisance of its own
-within the tolerance, whose prior is its everyday size. What so little does is linear in the size: its derivative is
-taken once, at the model as configured and again at the best answer, and such a nuisance costs no
-run.
+within the tolerance, whose prior is its everyday size. What so little does is linear in the size:
+its derivative is taken once, at the model as configured and again at the best answer, and such a
+nuisance costs no run.
 """
 
 from collections.abc import Collection, Iterator, Sequence

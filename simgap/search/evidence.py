@@ -7,7 +7,7 @@ It is the marginal likelihood of Laplace's approximation (D. J. C. MacKay, Infor
 Inference, and Learning Algorithms, 2003, chapter 27), with the cost E of the residuals, their
 Gauss-Newton Hessian H, the precision P of the priors and the values x at the end of the fit:
 
-    log p(data | h) = -E / T - x P x / 2 - log det(1 + P^-1/2 H P^-1/2 / T) / 2
+    log p(data | h) = -(E + x P x / 2) / T - log det(1 + P^-1/2 H P^-1/2 / T) / 2
 
 less the same determinant of the nuisances alone, which all hypotheses have and whose derivatives
 differ by their errors.
@@ -30,7 +30,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from simgap.fit.least_squares import LeastSquares
-from simgap.fit.state import FitState, prior_precision, proper_precision
+from simgap.fit.state import FitState, proper_precision
 from simgap.machine.contract import FloatArray
 from simgap.search.hypothesis import Hypothesis
 from simgap.settings import EvidenceSettings

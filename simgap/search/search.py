@@ -8,8 +8,8 @@ the nuisances stay close to their priors. Effects are added that a screening by 
 promises, and those that fit best when their sizes are tried out. The noise is lowered to what the
 best leaves. The best are expanded in turn by all moves (`moves`), and ranked by their evidence.
 All this is done with coarser steps of the simulation and the beginning of each test. The best are
-then fitted to the whole tests, at the noise that the best of them shows, and so is each with one
-effect less, or with two of its effects joined in one.
+then fitted to the whole tests, at the noise that the best of them shows. The best one is also
+fitted with one effect less, or with two of its effects joined in one, until it stays the best.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -120,9 +120,8 @@ class Search:
     def _changes(self, base: Hypothesis) -> Iterator[Move]:
         """Yield moves that take an effect away or put it elsewhere."""
         problem, catalogue = self._problem, self._problem.machine.catalogue
-        for effect in base.effects:
+        for effect, was in base.items:
             yield partial(moves.dropped, problem, base, effect)
-            was = base.forms[base.effects.index(effect)]
             if was.is_course:
                 continue
             rest = [other for other in base.effects if other != effect]

@@ -138,7 +138,7 @@ def _pulses_of_reading(experiment: Experiment, channel: int, scales: TimeScales)
     # the cost grows with the third power of their number
     first, last = float(experiment.time[0]), float(experiment.time[-1])
     rise = max(scales.pulse_s, (last - first) / _MOST_PULSES)
-    starts = np.arange(float(experiment.time[0]), float(experiment.time[-1]) - 2.0 * rise, rise)
+    starts = np.arange(first, last - 2.0 * rise, rise)
     pulses = np.maximum(0.0, 1.0 - np.abs(experiment.time[:, np.newaxis] - starts - rise) / rise)
     if experiment.colours:
         colour = experiment.colours[channel]
