@@ -47,7 +47,7 @@ def answers_of(machine: Machine) -> list[Rival]:
         numbers = [*machine.nuisances, *(p for form in forms for p in form.parameters)]
         state = problem.fit(problem.start(numbers, {}), 20)
         answers.append(Answer(Hypothesis(effects, forms, state), probability))
-    return rivals_of(problem, answers, 1.0, DEFAULT)
+    return rivals_of(answers, 1.0, DEFAULT)
 
 
 @pytest.mark.parametrize('gain', [0.3, -0.3])
@@ -75,9 +75,9 @@ def test_an_answer_that_is_as_good_as_impossible_is_no_rival() -> None:
     problem = LeastSquares(Gauge(0.0, 0.03))
     none = Hypothesis((), (), problem.start(problem.machine.nuisances, {}))
     sure = [Answer(none, probability) for probability in (0.9, 0.1, 0.001)]
-    assert [r.probability for r in rivals_of(problem, sure, 1.0, DEFAULT)] == [0.9, 0.1]
+    assert [r.probability for r in rivals_of(sure, 1.0, DEFAULT)] == [0.9, 0.1]
     many = [Answer(none, 0.1)] * 10
-    assert len(rivals_of(problem, many, 1.0, DEFAULT)) == DEFAULT.verdict.largest_group
+    assert len(rivals_of(many, 1.0, DEFAULT)) == DEFAULT.verdict.largest_group
 
 
 def test_a_more_precise_test_tells_them_apart() -> None:
