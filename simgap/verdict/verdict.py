@@ -76,7 +76,8 @@ def ranked(found: Found, unknown: float) -> list[Answer]:
 def unknown_probability(found: Found, places: Sequence[Place]) -> float:
     """Return the probability that something outside the catalogue is at work."""
     settings, evidence = found.problem.settings.verdict, found.evidence
-    best = max(places, key=lambda place: place.evidence, default=None)
+    # of equally likely places one may explain a third and another most of what is left
+    best = max(places, key=lambda place: place.explained, default=None)
     if best is None or best.evidence / evidence.temperature < (
             evidence.price_of_form(True) if found.best.effects else 0.0):
         return settings.least_unknown
