@@ -237,7 +237,7 @@ def _joined(channel: Channel, stamps: IntArray, join: str) -> FloatArray:
     nearest = np.unique(np.searchsorted(middles, channel.time_ns))
     inside = (stamps >= channel.time_ns[0]) & (stamps <= channel.time_ns[-1])
     nearest = nearest[inside[nearest]]
-    column[nearest] = channel.at(stamps[nearest], 'linear')
+    column[nearest] = channel.at(stamps[nearest])
     return column
 
 
