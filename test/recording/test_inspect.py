@@ -9,6 +9,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from recording.test_others_recordings import (
+    close, EFFORT, ELBOW, JOINTS, STAMPS, TIME, torques, write_json_mcap, write_protobuf_mcap,
+    write_rosbag2,
+)
 from rosbags.rosbag2 import StoragePlugin
 from scipy.io import savemat
 from simgap.cli import main
@@ -16,10 +20,6 @@ from simgap.inputs.plain_yaml import parse_yaml
 from simgap.logs.channel import Channel
 from simgap.logs.log import Log, read_logs
 from simgap.logs.suspicions import suspicions
-from test_others_recordings import (
-    close, EFFORT, ELBOW, JOINTS, STAMPS, TIME, torques, write_json_mcap, write_protobuf_mcap,
-    write_rosbag2,
-)
 
 RANDOM = np.random.default_rng(7)
 

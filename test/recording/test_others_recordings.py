@@ -334,7 +334,8 @@ def test_a_table_that_lies_on_its_side(tmp_path: Path) -> None:
 def test_the_time_inside_a_matrix(tmp_path: Path) -> None:
     table = np.vstack([TIME, ELBOW, EFFORT])  # a Simulink 'To File': rows are signals
     savemat(tmp_path / 'a.mat', {'data': table, 'upright': table.T, 'd': [[2.0]]})
-    signals = {'angle': {'column': 'data[1]'}, 'effort': {'column': 'data', 'index': 2}}
+    signals: dict[str, dict[str, Any]] = {'angle': {'column': 'data[1]'},
+                                          'effort': {'column': 'data', 'index': 2}}
     log = read(tmp_path / 'a.mat', signals, transposed=True, time={'column': 'data', 'index': 0})
     close(log.time, np.round(TIME, 9))
     close(log['angle'], ELBOW)
