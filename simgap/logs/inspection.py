@@ -198,7 +198,7 @@ def _unit(name: str, values: FloatArray) -> str:
     for written in (told, behind):
         if written and (unit := _WRITTEN.get(written[1].replace('/', '_'))):
             return unit
-    last = re.sub(r'\[.*?\]', '', name).rpartition('.')[2]
+    last = re.sub(r'\[.*?\]', '', name).removesuffix('.data').rpartition('.')[2]
     unit = next((unit for words, unit in _WORDS if re.search(words, last, re.I)), '1')
     greatest = float(np.max(np.abs(values), initial=0.0))
     if unit == 'rad' and greatest > 1.0 and bool(np.all(np.mod(values, 1.0) == 0.0)):

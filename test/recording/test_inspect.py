@@ -51,7 +51,7 @@ def test_a_bag(plugin: StoragePlugin, tmp_path: Path, capsys: pytest.CaptureFixt
         assert tree['signals'][f'joint_states_{field}_elbow'] == {
             'column': f'/joint_states.{field}[name=elbow]', 'unit': unit}
     assert tree['signals']['torques_data_top'] == {
-        'column': '/torques.data[top]', 'unit': '1', 'time_column': 'log_time', 'join': 'linear'}
+        'column': '/torques.data[top]', 'unit': 'N m', 'time_column': 'log_time', 'join': 'linear'}
     assert '"unit": "rad"}  # 0 to 0.999526\n' in told
     assert '  # joint_states_velocity_wrist: ' in told and 'stands at 0 all the time' in told
 
