@@ -12,6 +12,8 @@ from collections.abc import Iterator, Mapping
 from decimal import Decimal
 from typing import Any
 
+import numpy as np
+
 # Longer lists are pictures or point clouds, of whose elements nobody asks for one.
 _LONGEST = 128
 # A time is a message of two numbers; ROS 2, Protobuf, Foxglove's JSON and ROS 1 call them so.
@@ -35,7 +37,7 @@ def fields_of(message: Any) -> dict[str, Any]:
 def numbers_of(message: Any) -> list[str]:
     """Return one path for each number of a message, with a label where there is one."""
     return [path for path, value, is_first in _walk(message, '')
-            if is_first and not isinstance(value, str) and not _is_list(value)]
+            if is_first and isinstance(value, (int, float, np.generic))]
 
 
 def _walk(value: Any, path: str, labels: Mapping[int, list[str]] = {},

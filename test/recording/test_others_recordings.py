@@ -198,7 +198,8 @@ def write_json_mcap(path: Path) -> None:
         channel = writer.register_channel('servo', 'json', schema)
         for k in range(COUNT):
             text = json.dumps({'t_ms': 1e3 * TIME[k], 'state': {'angle': ELBOW[k]},
-                               'names': ['a', 'b'], 'load': [1, None if k else 2]})
+                               'names': ['a', 'b'], 'load': [1, None if k else 2],
+                               'none': None, 'note': 'x'})
             writer.add_message(channel, int(LOGGED[k]), text.encode(), int(LOGGED[k]))
         writer.finish()
 
