@@ -96,9 +96,9 @@ class VerdictSettings:
     wide: float = _at(
         0.4, '1', 'half an interval, as a share of its value, from which it is said to be wide')
     left: float = _at(
-        0.3, '1', 'share of what the best leaves that an unknown input explains, from which '
-        'unknown is likelier than not', YARDSTICK)
-    left_width: float = _at(0.04, '1', 'how sharply', YARDSTICK)
+        0.09, '1', 'share of what the best leaves that an unknown input explains, net of what its '
+        'freedom costs, from which unknown is likelier than not', WILD)
+    left_width: float = _at(0.2, '1', 'how sharply, in the logarithm of the share', WILD)
     least_unknown: float = _at(0.03, 'probability', 'least probability of unknown', YARDSTICK)
     most_unknown: float = _at(0.85, 'probability', 'greatest probability of unknown', YARDSTICK)
     partly: float = _at(

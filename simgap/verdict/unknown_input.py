@@ -34,7 +34,8 @@ class Place:
     name: str  # for people
     component: str  # the part of the machine
     evidence: float  # natural logarithm of how much likelier an input makes the gap
-    explained: float  # share of the gap's energy that an input explains, 0 to 1
+    # share of the gap's energy that an input explains, 0 to 1, net of what its freedom costs
+    explained: float
 
 
 def places(problem: LeastSquares, point: Mapping[str, float]) -> list[Place]:
@@ -198,9 +199,9 @@ class _Evidence:
         square = linalg.block_diag(*squares) - projected @ cross
         slope = np.concatenate(slopes) - projected @ self._slope
         size = float(np.trace(square)) / len(square)
-        best, share, heights = 0.0, 0.0, np.zeros(len(square))
+        best, heights = 0.0, np.zeros(len(square))
         if size <= 0.0:
-            return best, share, heights
+            return best, 0.0, heights
         for pulses in smooth:
             roots = [_root(columns.shape[1], pulses) for columns in responses]
             own = _rows(roots, _rows(roots, square / size).T)
@@ -214,10 +215,14 @@ class _Evidence:
                 evidence = -0.5 * (self._count * np.log(left)
                                    + float(np.sum(np.log1p(ratio * values))))
                 if evidence > best:
-                    best, share = float(evidence), (1.0 - left) * self._loud
+                    best = float(evidence)
                     heights = _rows([root.T for root in roots], vectors @ (
                         turned / (values + 1.0 / ratio))) / size
-        return best, share, heights
+        return best, self._net(best), heights
+
+    def _net(self, evidence: float) -> float:
+        """Return the share of the energy whose loss alone would be worth this evidence."""
+        return self._loud * (1.0 - math.exp(-2.0 * evidence / max(self._count, 1.0)))
 
     def repeated(self, channel: int, problem: LeastSquares) -> tuple[float, float]:
         """Return the evidence that a reading repeats itself within a pulse, and its share."""
@@ -235,7 +240,7 @@ class _Evidence:
         factors = linalg.solve_toeplitz(products[:-1] + 1e-9 * products[0] * _FIRST, products[1:])
         left = float(np.clip(1.0 - factors @ products[1:] / products[0], 1e-9, 1.0))
         evidence = -0.5 * (count * math.log(left) + _LAGS * math.log(count))
-        return max(evidence, 0.0), (1.0 - left) * self._loud
+        return max(evidence, 0.0), self._net(max(evidence, 0.0))
 
 
 def _rows(roots: Sequence[FloatArray], matrix: FloatArray) -> FloatArray:

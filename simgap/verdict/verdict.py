@@ -75,13 +75,9 @@ def ranked(found: Found, unknown: float) -> list[Answer]:
 
 def unknown_probability(found: Found, places: Sequence[Place]) -> float:
     """Return the probability that something outside the catalogue is at work."""
-    settings, evidence = found.problem.settings.verdict, found.evidence
-    # of equally likely places one may explain a third and another most of what is left
-    best = max(places, key=lambda place: place.explained, default=None)
-    if best is None or best.evidence / evidence.temperature < (
-            evidence.price_of_form(True) if found.best.effects else 0.0):
-        return settings.least_unknown
-    beyond = (best.explained - settings.left) / settings.left_width
+    settings = found.problem.settings.verdict
+    explained = max((place.explained for place in places), default=0.0)
+    beyond = math.log(max(explained, 1e-9) / settings.left) / settings.left_width
     share = 0.5 * (1.0 + math.tanh(0.5 * beyond))
     return settings.least_unknown + (settings.most_unknown - settings.least_unknown) * share
 
