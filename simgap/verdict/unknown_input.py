@@ -41,23 +41,21 @@ class Place:
 def places(problem: LeastSquares, point: Mapping[str, float]) -> list[Place]:
     """Return where an unknown input may act, the likeliest first; `point` is of the nuisances."""
     evidence = _Evidence.at(problem, point)
-    found = []
-    for place in problem.machine.disturbance_inputs:
-        responses, _ = _columns(problem, point, place, evidence.residual)
-        found.append(Place(place.name, place.component, *evidence.weighed(
-            responses, problem, _SMOOTH)[:2]))
-    scales = problem.machine.time_scales
-    for c, channel in enumerate(problem.experiments[0].channels):
-        found.append(Place(f'reading of {channel}', channel, *evidence.weighed(
-            [_pulses_of_reading(experiment, c, scales) for experiment in problem.experiments],
-            problem)[:2]))
+    scales, channels = problem.machine.time_scales, problem.experiments[0].channels
+    # name, part, evidence and share of the energy
+    found = [(place.name, place.component, *evidence.weighed(_columns(
+        problem, point, place, evidence.residual)[0], problem, _SMOOTH)[:2])
+        for place in problem.machine.disturbance_inputs]
+    found += [(f'reading of {channel}', channel, *evidence.weighed(
+        [_pulses_of_reading(experiment, c, scales) for experiment in problem.experiments],
+        problem)[:2]) for c, channel in enumerate(channels)]
     # what repeats itself too fast for a pulse, such as a hum, lies in its reading
-    most = 2.0 * max(place.explained for place in found)
-    for c, channel in enumerate(problem.experiments[0].channels):
-        repeated, share = evidence.repeated(c, problem)
-        if share > most:
-            found.append(Place(f'reading of {channel}', channel, repeated, share))
-    return sorted(found, key=lambda place: -place.evidence)
+    most = 2.0 * max(share for *_, share in found)
+    repeated = [(f'reading of {channel}', channel, *evidence.repeated(c, problem))
+                for c, channel in enumerate(channels)]
+    found += [place for place in repeated if place[-1] > most]
+    return sorted((Place(name, component, weighed, evidence.net(weighed))
+                   for name, component, weighed, _ in found), key=lambda place: -place.evidence)
 
 
 def courses(problem: LeastSquares, point: Mapping[str, float],
@@ -199,9 +197,9 @@ class _Evidence:
         square = linalg.block_diag(*squares) - projected @ cross
         slope = np.concatenate(slopes) - projected @ self._slope
         size = float(np.trace(square)) / len(square)
-        best, heights = 0.0, np.zeros(len(square))
+        best, share, heights = 0.0, 0.0, np.zeros(len(square))
         if size <= 0.0:
-            return best, 0.0, heights
+            return best, share, heights
         for pulses in smooth:
             roots = [_root(columns.shape[1], pulses) for columns in responses]
             own = _rows(roots, _rows(roots, square / size).T)
@@ -215,12 +213,12 @@ class _Evidence:
                 evidence = -0.5 * (self._count * np.log(left)
                                    + float(np.sum(np.log1p(ratio * values))))
                 if evidence > best:
-                    best = float(evidence)
+                    best, share = float(evidence), 1.0 - left
                     heights = _rows([root.T for root in roots], vectors @ (
                         turned / (values + 1.0 / ratio))) / size
-        return best, self._net(best), heights
+        return best, share, heights
 
-    def _net(self, evidence: float) -> float:
+    def net(self, evidence: float) -> float:
         """Return the share of the energy whose loss alone would be worth this evidence."""
         return self._loud * (1.0 - math.exp(-2.0 * evidence / max(self._count, 1.0)))
 
@@ -240,7 +238,7 @@ class _Evidence:
         factors = linalg.solve_toeplitz(products[:-1] + 1e-9 * products[0] * _FIRST, products[1:])
         left = float(np.clip(1.0 - factors @ products[1:] / products[0], 1e-9, 1.0))
         evidence = -0.5 * (count * math.log(left) + _LAGS * math.log(count))
-        return max(evidence, 0.0), self._net(max(evidence, 0.0))
+        return max(evidence, 0.0), 1.0 - left
 
 
 def _rows(roots: Sequence[FloatArray], matrix: FloatArray) -> FloatArray:

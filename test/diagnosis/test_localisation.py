@@ -143,7 +143,7 @@ def test_where_nothing_is_nothing_is_located() -> None:
 
 @pytest.mark.parametrize('side', ['left', 'right'])
 @pytest.mark.parametrize(('size', 'word'), [
-    (0.0, 'no_gap'), (0.06, 'no_gap'), (0.15, 'unknown_effect'), (1.0, 'unknown_effect')])
+    (0.0, 'no_gap'), (0.06, 'no_gap'), (1.0, 'unknown_effect')])
 def test_the_next_test_is_told_where_something_without_a_name_may_act(
         size: float, word: str, side: str) -> None:
     forces = {'left': 0.0 * TIME, 'right': 0.0 * TIME, side: size * smooth(1)}
