@@ -29,8 +29,7 @@ from simgap.errors import one_line
 from simgap.inputs.plain import PlainDataError
 from simgap.inputs.schema import nearest
 from simgap.logs.channel import (
-    Channel, check_name, FloatArray, make_channel, Method, METHODS, NANOSECONDS, nanoseconds,
-    RecordingError,
+    Channel, check_name, make_channel, NANOSECONDS, nanoseconds, RecordingError,
 )
 
 
@@ -58,19 +57,6 @@ class Change(NamedTuple):
     values: Mapping[str, Any]
 
 
-class Aligned(NamedTuple):
-    """Several signals on common time stamps."""
-
-    time_s: FloatArray  # array of shape (n,) [s]
-    values: FloatArray  # array of shape (n, m), one column for each name
-    # m texts each
-    names: tuple[str, ...]
-    units: tuple[str, ...]
-    method: str  # one sentence that says how the values were found
-    # for each name the widest distance between neighbouring samples used [s]
-    longest_gap_s: tuple[float, ...]
-
-
 @dataclass(frozen=True)
 class Recording:
     """
@@ -82,8 +68,8 @@ class Recording:
     ...     [0.0, 0.5, 1.0], {'motor_1/current': [0.0, 1.0, 4.0]})
     >>> recording['motor_1/current'].unit
     'article A'
-    >>> recording.resample(4.0).align().values[:, 0].tolist()
-    [0.0, 0.5, 1.0, 2.5, 4.0]
+    >>> recording.between(0.5)['motor_1/current'].time_s.tolist()
+    [0.5, 1.0]
     """
 
     channels: Mapping[str, Channel]  # 'unit/signal' -> Channel, in the order given
@@ -92,7 +78,7 @@ class Recording:
     # live changes of tuning parameters, in the order of their steps
     changes: tuple[Change, ...] = ()
     sheet: TestSheet = TestSheet()  # the test sheet; empty if there is none
-    # anything else that is known, plain data (source, method of resampling, payload ...)
+    # anything else that is known, plain data (source, payload ...)
     notes: Mapping[str, Any] = field(default_factory=dict)
 
     __hash__ = None  # type: ignore[assignment]
@@ -202,9 +188,6 @@ class Recording:
         """Return the samples of start_s <= t < end_s, with their time stamps."""
         low = -2**63 if start_s < -9.2e9 else nanoseconds(start_s)
         high = 2**63 - 1 if end_s > 9.2e9 else nanoseconds(end_s)
-        return self._cut(low, high)
-
-    def _cut(self, low: int, high: int) -> Recording:
         cut = {}
         for name, channel in self.channels.items():
             first, last = np.searchsorted(channel.time_ns, [low, high])
@@ -223,101 +206,3 @@ class Recording:
             channel = self[name]
             moved[name] = Channel(channel.unit, channel.time_ns + offset_ns, channel.values)
         return replace(self, channels=moved)
-
-    def periods(self, period_s: float, start_s: float = 0.0) -> tuple[Recording, ...]:
-        """
-        Cut into the whole periods of a repeated excitation, each with its own time from zero.
-
-        period_s : length of a period [s]
-        start_s : where the first period begins [s]; what lies before is left out
-
-        Returns as many recordings as whole periods fit before the last sample.
-
-        Raises RecordingError: the period is not positive.
-        """
-        period_ns, start_ns = nanoseconds(period_s), nanoseconds(start_s)
-        if period_ns <= 0:
-            raise RecordingError(f'a period of {period_s:g} s is not positive')
-        # a period sampled at its start and every h after ends one h before the next period
-        longest = max((int(np.diff(c.time_ns[-2:])[0]) for c in self.channels.values()
-                       if len(c) > 1), default=0)
-        count = max(0, (self.end_ns + longest - start_ns) // period_ns)
-        begins = [start_ns + i * period_ns for i in range(count)]
-        return tuple(self._cut(begin, begin + period_ns).shift_ns(-begin) for begin in begins)
-
-    # -- onto other time stamps ---------------------------------------------------------------
-
-    def common_span_ns(self, names: Sequence[str]) -> tuple[int, int]:
-        """
-        Return the first and last time at which all of `names` have samples around [ns].
-
-        Raises RecordingError: there is no such signal, it has no sample, or there is no common
-        time.
-        """
-        channels = {name: self[name] for name in names}
-        for name, channel in channels.items():
-            if not len(channel):
-                raise RecordingError(f'{name}: no sample')
-        first = max((int(c.time_ns[0]) for c in channels.values()), default=0)
-        last = min((int(c.time_ns[-1]) for c in channels.values()), default=-1)
-        if last < first:
-            raise RecordingError(f'{", ".join(names) or "no signal"}: no common time')
-        return first, last
-
-    def align(self, names: Sequence[str] | None = None, onto: str | ArrayLike | None = None,
-              method: Method = 'linear') -> Aligned:
-        """
-        Return several signals on common time stamps.
-
-        Nothing is filtered: thinning to fewer samples folds faster contents down. Nothing is
-        extrapolated: only times at which all of `names` have samples around are used.
-
-        names : the signals wanted; all if not given
-        onto : a signal, whose time stamps are used, or an array of times [s]; the first of `names`
-            if not given
-        method : one of METHODS
-
-        Raises RecordingError: there is no such signal or method, no common time, or a time given
-        in `onto` lies outside the common time.
-        """
-        wanted = tuple(self.names if names is None else names)
-        first, last = self.common_span_ns(wanted)
-        if onto is None or isinstance(onto, str):
-            target = onto if isinstance(onto, str) else wanted[0]
-            stamps = self[target].time_ns
-            stamps = stamps[(stamps >= first) & (stamps <= last)]
-            where = f'the time stamps of {target}'
-        else:
-            stamps = nanoseconds(np.atleast_1d(np.asarray(onto, dtype=np.float64)))
-            where = f'{len(stamps)} given times'
-        columns = [self[name].at(stamps, method) for name in wanted]
-        gaps = []
-        for name in wanted:
-            own = self[name].time_ns
-            used = own[(own >= first) & (own <= last)]
-            gaps.append(float(np.diff(used).max(initial=0)) / NANOSECONDS)
-        return Aligned(
-            stamps / NANOSECONDS, np.column_stack(columns), wanted,
-            tuple(self[name].unit for name in wanted),
-            f'{METHODS[method]}, at {where}, unfiltered', tuple(gaps))
-
-    def resample(self, rate_hz: float, method: Method = 'linear',
-                 names: Sequence[str] | None = None) -> Recording:
-        """
-        Return the recording at an even rate, over the time that all its signals share.
-
-        The notes of the result say how it was done, under 'resampled'. Unfiltered, see `align`.
-
-        Raises RecordingError: the rate is not positive or above 1e9 Hz, or see `align`.
-        """
-        if not 0.0 < rate_hz <= 1e9:
-            raise RecordingError(f'a rate of {rate_hz:g} Hz is not above 0 and at most 1e9')
-        wanted = tuple(self.names if names is None else names)
-        first, last = self.common_span_ns(wanted)
-        count = int((last - first) / NANOSECONDS * rate_hz + 1e-6) + 1
-        stamps = first + np.rint(np.arange(count) * (NANOSECONDS / rate_hz)).astype(np.int64)
-        stamps = stamps[stamps <= last]
-        channels = {name: Channel(self[name].unit, stamps, self[name].at(stamps, method))
-                    for name in wanted}
-        how = f'{METHODS[method]}, every 1/{rate_hz:g} s, unfiltered'
-        return replace(self, channels=channels, notes={**self.notes, 'resampled': how})

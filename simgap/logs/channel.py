@@ -2,10 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The samples of one signal, each with its own time stamp in whole nanoseconds, as in MCAP."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,12 +11,7 @@ from simgap.errors import one_line, UserError
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
-Method = Literal['linear', 'hold', 'nearest']
 NANOSECONDS = 1_000_000_000
-METHODS: Mapping[Method, str] = MappingProxyType({
-    'linear': 'straight line between the neighbouring samples',
-    'hold': 'the last sample before (zero-order hold)',
-    'nearest': 'the nearest sample, the later one in the middle'})
 
 
 class RecordingError(UserError, ValueError):
@@ -106,24 +99,22 @@ class Channel:
         result: FloatArray = self.time_ns / NANOSECONDS
         return result
 
-    def at(self, time_ns: IntArray, method: Method = 'linear') -> FloatArray:
-        """Return values [unit] at times [ns], shape (m,); RecordingError outside the samples."""
-        if method not in METHODS:
-            raise RecordingError(f'no method {method!r}: choose one of {", ".join(METHODS)}')
+    def at(self, time_ns: IntArray) -> FloatArray:
+        """
+        Return values [unit] at times [ns] on straight lines between the samples, shape (m,).
+
+        RecordingError outside the samples.
+        """
         if len(time_ns) == 0:
             return np.empty(0)
         if not len(self) or time_ns.min() < self.time_ns[0] or time_ns.max() > self.time_ns[-1]:
             raise RecordingError('a time lies outside the samples; nothing is extrapolated')
         before = np.searchsorted(self.time_ns, time_ns, side='right') - 1
-        if method == 'hold':
-            return self.values[before]
         after = np.minimum(before + 1, len(self) - 1)
         # differences of whole nanoseconds are exact however large the stamps are
         past = (time_ns - self.time_ns[before]).astype(np.float64)
         width = (self.time_ns[after] - self.time_ns[before]).astype(np.float64)
         share = np.divide(past, width, out=np.zeros_like(past), where=width > 0)
-        if method == 'nearest':
-            return self.values[np.where(share >= 0.5, after, before)]
         result: FloatArray = (1.0 - share) * self.values[before] + share * self.values[after]
         return result
 

@@ -9,7 +9,7 @@ import dataclasses
 import doctest
 import math
 import pickle
-from typing import Any, get_args
+from typing import Any
 
 from antenna_drive.emulator.wiring import OUTPUTS, signal_names
 from antenna_drive.recording import recording as module
@@ -19,7 +19,7 @@ from hypothesis import given, strategies as st
 import numpy as np
 import pytest
 from simgap.inputs.plain import PlainDataError
-from simgap.logs.channel import Channel, Method, METHODS, nanoseconds, RecordingError
+from simgap.logs.channel import Channel, nanoseconds, RecordingError
 
 CURRENT, COMMAND = 'motor_1/current', 'test_signal/rate_command'
 
@@ -151,45 +151,28 @@ def repeated(count: int) -> Recording:
     return Recording.from_arrays(np.arange(100 * count) / 100, values)
 
 
-def test_periods_of_a_repeated_excitation() -> None:
-    period, whole = ramp(100, 1), repeated(5)
-    assert len(whole[CURRENT]) == 500
-    assert whole.periods(1.0) == (period,) * 5
-    # of 4.5 s from 0.2 s on, three whole periods of 1.3 s fit
-    assert len(whole.between(0, 4.5).periods(1.3, 0.2)) == 3
-
-
 def test_stamps_of_a_wall_clock_lose_no_nanosecond() -> None:
     start = 1_768_472_890_123_456_789  # a double knows such a time to 256 ns
     whole = repeated(3).shift_ns(start)
     assert whole[CURRENT].time_ns[1] == start + 10_000_000
     assert whole.shift_ns(-start) == repeated(3)
-    assert whole.shift_ns(-start).periods(1.0) == (ramp(100, 1),) * 3
-    for period in whole.periods(1.0, start_s=1_768_472_890.0):
-        assert np.all(np.diff(period[CURRENT].time_ns) == 10_000_000)
+    assert np.all(np.diff(whole[CURRENT].time_ns) == 10_000_000)
+    assert len(whole.between(1_768_472_891.0, 1_768_472_892.0)[CURRENT]) == 100
 
 
 @given(st.lists(st.integers(1, 10**9), min_size=2, max_size=30), st.data())
-def test_linear_resampling_of_a_ramp_is_the_ramp(steps: list[int], data: st.DataObject) -> None:
+def test_between_the_samples_of_a_ramp_lies_the_ramp(steps: list[int],
+                                                     data: st.DataObject) -> None:
     stamps = np.cumsum(steps)
     channel = Channel('A', stamps, 3.0 * (stamps / 1e9) + 1.0)
     wanted = np.array(data.draw(st.lists(
         st.integers(int(stamps[0]), int(stamps[-1])), min_size=1, max_size=20)))
-    assert channel.at(wanted, 'linear') == pytest.approx(3.0 * (wanted / 1e9) + 1.0, rel=1e-12)
+    assert channel.at(wanted) == pytest.approx(3.0 * (wanted / 1e9) + 1.0, rel=1e-12)
 
 
-def test_hold_and_nearest_take_measured_values_only() -> None:
-    channel = Channel('A', np.array([0, 10, 30]), np.array([1.0, 2.0, 3.0]))
-    wanted = np.array([0, 4, 5, 9, 10, 19, 20, 29, 30])
-    assert channel.at(wanted, 'hold').tolist() == [1, 1, 1, 1, 2, 2, 2, 2, 3]
-    assert channel.at(wanted, 'nearest').tolist() == [1, 1, 2, 2, 2, 2, 3, 3, 3]
-    assert set(METHODS) == set(get_args(Method))
-
-
-@pytest.mark.parametrize('method', METHODS)
-def test_resampling_onto_its_own_times_changes_nothing(method: Method) -> None:
+def test_values_at_its_own_times_are_the_samples() -> None:
     channel = ramp(70, 1)[COMMAND]
-    assert channel.at(channel.time_ns, method).tobytes() == channel.values.tobytes()
+    assert channel.at(channel.time_ns).tobytes() == channel.values.tobytes()
 
 
 def test_nothing_is_extrapolated() -> None:
@@ -197,36 +180,6 @@ def test_nothing_is_extrapolated() -> None:
     for outside in (-1, 11):
         with pytest.raises(RecordingError, match='nothing is extrapolated'):
             channel.at(np.array([outside]))
-    with pytest.raises(RecordingError, match='no method'):
-        channel.at(np.array([1]), 'cubic')  # type: ignore[arg-type]
-
-
-def test_alignment_states_its_method_and_the_widest_gap() -> None:
-    slow = np.array([0.0, 0.5, 0.6, 2.0])
-    recording = Recording({
-        CURRENT: Channel('A', nanoseconds(slow), 4.0 * slow),
-        COMMAND: Channel('rad/s', nanoseconds(np.arange(30) * 0.1), np.arange(30.0))})
-    aligned = recording.align([CURRENT, COMMAND], onto=COMMAND)
-    assert aligned.time_s == pytest.approx(np.arange(21) * 0.1)
-    assert aligned.values[:, 0] == pytest.approx(0.4 * np.arange(21))
-    assert aligned.longest_gap_s == pytest.approx((1.4, 0.1))
-    assert 'straight line' in aligned.method
-    assert COMMAND in aligned.method
-    assert aligned.units == ('article A', 'rad/s')
-    assert recording.align(onto=[0.25]).values == pytest.approx(np.array([[1.0, 2.5]]))
-
-
-def test_resampling_covers_the_common_time_and_says_how() -> None:
-    recording = ramp(100, 1).shift_ns(105_000_000, [CURRENT]).resample(20.0, 'hold')
-    stamps = recording[CURRENT].time_ns
-    assert stamps[0] == 105_000_000
-    assert np.all(np.diff(stamps) == 50_000_000)
-    assert stamps[-1] <= 990_000_000 < stamps[-1] + 50_000_000
-    assert 'last sample before' in recording.notes['resampled']
-    with pytest.raises(RecordingError, match='no common time'):
-        ramp(100, 1).shift_ns(5_000_000_000, [CURRENT]).resample(20.0)
-    with pytest.raises(RecordingError, match='not above 0'):
-        ramp(100, 1).resample(0.0)
 
 
 def test_live_changes_are_kept_and_frozen() -> None:
