@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""How every command reads a recording: its options, and warnings in one line."""
+"""The recording that a command reads: the options that name it, and what is refused."""
 
 import argparse
 from collections.abc import Iterable
