@@ -15,17 +15,16 @@ from simgap.errors import UserError
 from simgap.logs.channel import Channel
 
 
-def add_recording_options(parser: argparse.ArgumentParser, span: bool = True) -> None:
+def add_recording_options(parser: argparse.ArgumentParser) -> None:
     """Add the recording to read, `--partial`, and `--from` and `--to` to read a part."""
     parser.add_argument('recording', metavar='RECORDING',
                         help='a bag (folder or .mcap), a .csv, or a servo log (.json)')
     parser.add_argument('--partial', action='store_true',
                         help='take what can be read of a bag that was cut off, and say how far')
-    if span:
-        parser.add_argument('--from', dest='start', type=float, default=-math.inf, metavar='S',
-                            help='leave out what was before this time [s]')
-        parser.add_argument('--to', dest='end', type=float, default=math.inf, metavar='S',
-                            help='leave out this time [s] and what came after')
+    parser.add_argument('--from', dest='start', type=float, default=-math.inf, metavar='S',
+                        help='leave out what was before this time [s]')
+    parser.add_argument('--to', dest='end', type=float, default=math.inf, metavar='S',
+                        help='leave out this time [s] and what came after')
 
 
 def refuse_none(name: object, channels: Iterable[Channel]) -> None:
@@ -41,7 +40,7 @@ def read(args: argparse.Namespace) -> Recording:
         # a servo's log belongs to its machine, which the room of recordings does not know
         recording = (read_bam(args.recording) if Path(args.recording).suffix == '.json'
                      else read_recording(args.recording, partial=args.partial))
-    if 'start' in args and (args.start > -math.inf or args.end < math.inf):
+    if args.start > -math.inf or args.end < math.inf:
         recording = recording.between(args.start, args.end)
     refuse_none(args.recording, recording.channels.values())
     return recording
