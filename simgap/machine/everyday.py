@@ -12,6 +12,7 @@ nuisance costs no run.
 
 from collections.abc import Collection, Iterator, Sequence
 from copy import copy
+from dataclasses import dataclass
 import math
 from typing import Any
 
@@ -19,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from simgap.machine.arrays import Course, FloatArray, Point
 from simgap.machine.catalogue import Catalogue
-from simgap.machine.effect import Form, Parameter
+from simgap.machine.effect import Effect, Form, Parameter
 from simgap.machine.experiment import Experiment
 from simgap.machine.machine import DisturbanceInput, Machine
 from simgap.machine.motion import Motion, TimeScales
@@ -34,27 +35,49 @@ def with_everyday(machine: Machine) -> Machine:
     neutral = machine.simulate([{}])[0]
     residuals = [e.measured - predicted for e, predicted in zip(
         machine.experiments, neutral, strict=True) if predicted is not None]
-    sizes: dict[str, tuple[Parameter, Point]] = {}
-    for form in _forms(machine, residuals):
+    sizes: dict[str, _Size] = {}
+    for effect, form in _forms(machine, residuals):
         for p in _sizes(machine, form):
             # of forms that are alike near zero the first one stands for all
-            sizes.setdefault(p.name, (p, form.start))
+            sizes.setdefault(p.name, _Size(p, form, effect))
     if not sizes:
         return machine
-    numbers = tuple(sizes.values())
-    return _Everyday(machine, numbers, _responses(machine, numbers, {}))
+    found = tuple(sizes.values())
+    return _Everyday(machine, found, _responses(machine, found, {}))
 
 
-def _responses(machine: Machine, numbers: Sequence[tuple[Parameter, Point]],
+@dataclass(frozen=True)
+class _Size:
+    """A size of an effect that everyday machines have."""
+
+    parameter: Parameter
+    form: Form
+    effect: Effect
+
+    def besides(self, point: Point, catalogue: Catalogue) -> Point:
+        """Return a point without the effect's other forms, which exclude this one."""
+        own = self.form.start
+        others = tuple(f'{effect.id}.' for effect in catalogue.values()
+                       if self.effect.id in (effect.id, *effect.parts))
+        return {name: value for name, value in point.items()
+                if name in own or not name.startswith(others)}
+
+
+def _responses(machine: Machine, sizes: Sequence[_Size],
                point: Point) -> list[NDArray[np.floating[Any]]]:
     """Return the derivatives by sizes, with the shapes of their forms, at a point."""
-    steps = [p.step if point.get(p.name, 0.0) + p.step <= p.high else -p.step for p, _ in numbers]
-    before, *after = machine.low_fidelity().simulate([point, *(
-        {**start, **point, p.name: point.get(p.name, 0.0) + step}
-        for (p, start), step in zip(numbers, steps, strict=True))])
+    bases = [size.besides(point, machine.catalogue) for size in sizes]
+    unlike = {frozenset(base): base for base in bases}
+    steps, stepped = [], []
+    for size, base in zip(sizes, bases, strict=True):
+        p, at = size.parameter, base.get(size.parameter.name, 0.0)
+        steps.append(p.step if at + p.step <= p.high else -p.step)
+        stepped.append({**size.form.start, **base, p.name: at + steps[-1]})
+    rows = machine.low_fidelity().simulate([*unlike.values(), *stepped])
+    before = dict(zip(unlike, rows, strict=False))
     return [np.stack([
-        np.nan_to_num((row[k] - before[k]) / step).ravel()  # type: ignore[operator]
-        for step, row in zip(steps, after, strict=True)], axis=-1)
+        np.nan_to_num((row[k] - before[frozenset(base)][k]) / step).ravel()  # type: ignore
+        for step, base, row in zip(steps, bases, rows[len(unlike):], strict=True)], axis=-1)
         for k in range(len(machine.experiments))]
 
 
@@ -66,15 +89,21 @@ def everyday_of(name: str) -> str:
 def taken_over(catalogue: Catalogue, effect: str, form: Form, point: Point) -> dict[str, float]:
     """Return a point in which the sizes of an effect begin at what its everyday sizes had."""
     # the two do the same, and a fit does not find from one to the other
-    found, whole = dict(point), catalogue[effect]
-    forms = [catalogue.counterpart(form, whole, catalogue[part]) for part in whole.parts] or [form]
-    for places in zip(form.parameters, *(own.parameters for own in forms), strict=True):
-        p, *own = places
-        had = [found.get(_PREFIX + item.name, 0.0) for item in own]
+    found = dict(point)
+    for p, names in alike(catalogue, effect, form):
+        had = [found.get(name, 0.0) for name in names]
         if any(had) and not p.is_shape:
-            found.update({_PREFIX + item.name: 0.0 for item in own})
+            found.update(dict.fromkeys(names, 0.0))
             found[p.name] = min(max(sum(had) / len(had), p.low), p.high)
     return found
+
+
+def alike(catalogue: Catalogue, effect: str, form: Form) -> Iterator[tuple[Parameter, list[str]]]:
+    """Yield the numbers of an effect, each with the names of everyday sizes that do the same."""
+    whole = catalogue[effect]
+    forms = [catalogue.counterpart(form, whole, catalogue[part]) for part in whole.parts] or [form]
+    for p, *own in zip(form.parameters, *(own.parameters for own in forms), strict=True):
+        yield p, [_PREFIX + item.name for item in own]
 
 
 def as_configured(machine: Machine) -> Machine:
@@ -82,11 +111,12 @@ def as_configured(machine: Machine) -> Machine:
     return machine.inner if isinstance(machine, _Everyday) else machine
 
 
-def _forms(machine: Machine, residuals: Sequence[FloatArray]) -> Iterator[Form]:
+def _forms(machine: Machine, residuals: Sequence[FloatArray]) -> Iterator[tuple[Effect, Form]]:
     for effect in machine.catalogue.values():
         # what acts in several places acts in each of them
         if not effect.parts:
-            yield from machine.catalogue.forms(effect, machine.experiments, residuals)
+            for form in machine.catalogue.forms(effect, machine.experiments, residuals):
+                yield effect, form
 
 
 def _sizes(machine: Machine, form: Form) -> list[Parameter]:
@@ -102,15 +132,15 @@ class _Everyday(Machine):
     """
     A machine with everyday sizes.
 
-    sizes : those of the inner machine, m of them, with the shapes of their forms
+    sizes : those of the inner machine, m of them
     responses : derivatives of the readings by them in each experiment, shape (n c, m)
     """
 
-    def __init__(self, inner: Machine, sizes: tuple[tuple[Parameter, Point], ...],
+    def __init__(self, inner: Machine, sizes: tuple[_Size, ...],
                  responses: Sequence[NDArray[np.floating[Any]]]) -> None:
         self._numbers = tuple(
             Parameter(_PREFIX + p.name, p.unit, -p.tolerance, p.tolerance, p.step,
-                      EVERYDAY * p.tolerance) for p, _ in sizes)
+                      EVERYDAY * p.tolerance) for p in (size.parameter for size in sizes))
         nuisances = copy(inner.nuisances)
         nuisances.extend(self._numbers)
         super().__init__(inner.experiments, nuisances, inner.catalogue)

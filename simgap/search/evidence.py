@@ -19,8 +19,7 @@ a sample counts, because residuals are loud or correlated. Each effect has to ga
 what shows an effect beside all that a model leaves out.
 
 No form of an effect is exact. What a further effect gains has to exceed the share of the whole
-gain that an error of form leaves. Where all effects have everyday sizes, these carry such errors,
-and it is no more than what the best leaves beyond noise.
+gain that an error of form leaves.
 """
 
 from __future__ import annotations
@@ -79,14 +78,12 @@ class Evidence:
         count, options = len(hypothesis.effects), self.settings
         sought = options.sought * sum(form.scanned for form in hypothesis.forms)
         shows = count * options.shows / self.scale ** 2
-        everyday = all(form.is_course or p.tolerance
-                       for form in hypothesis.forms for p in form.sizes)
-        return -shows - sought - max(count - 1, 0) * self.price_of_form(everyday)
+        return -shows - sought - max(count - 1, 0) * self.price_of_form
 
-    def price_of_form(self, everyday: bool) -> float:
-        """Return what an error of form could be worth, beside everyday sizes or without them."""
-        left = 0.5 * (self.temperature - 1.0) * self.samples if everyday else np.inf
-        return min(self.settings.form_error ** 2 * self.gain, left) / self.temperature
+    @property
+    def price_of_form(self) -> float:
+        """Return what an error of form could be worth."""
+        return self.settings.form_error ** 2 * self.gain / self.temperature
 
     def ranked(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
         """Return hypotheses, the best first."""

@@ -91,7 +91,11 @@ def refitted(problem: LeastSquares, base: Hypothesis, anchor: Hypothesis,
              nuisances: Jacobian) -> Hypothesis:
     """Return a hypothesis fitted to another problem, with derivatives at an anchor's nuisances."""
     own = [p for form in base.forms for p in form.parameters]
-    sizes = {p.name: base.state.value(p.name) for p in own}
+    # what an effect does is not done again by the everyday sizes that the anchor has in its place
+    at = base.state.point()
+    sizes = {name: at[name] for effect, form in base.items
+             for p, names in everyday.alike(problem.machine.catalogue, effect, form)
+             for name in (p.name, *names) if name in at}
     # one of them may be in a local minimum
     points = [{**{p.name: h.state.point().get(p.name, 0.0) for p in problem.machine.nuisances},
                **sizes} for h in (base, anchor)]

@@ -127,3 +127,30 @@ def test_what_an_everyday_size_has_taken_goes_over_to_its_effect() -> None:
     after = taken_over(machine.catalogue, item.id, item.forms[0], before)
     assert after == {**before, 'everyday:load.creep.size': 0.0, 'load.creep.size': 1.2}
     assert machine.predict(after, 0) == pytest.approx(machine.predict(before, 0))
+
+
+class OfTwoForms(Table):
+    """A table whose ripple has two forms, of which the second one takes the place of the first."""
+
+    def __init__(self) -> None:
+        super().__init__({})
+        [ripple] = [item for item in self.catalogue.values() if item.id == 'gear.ripple']
+        fast = Parameter('gear.ripple.fast', 'm', -2.0, 2.0, 1e-3, tolerance=TOLERANCE)
+        self.catalogue = type(self.catalogue)([
+            replace(ripple, forms=(*ripple.forms, Form('fast', (fast,)))),
+            *(item for item in self.catalogue.values() if item is not ripple)])
+
+    def predict(self, point: Point, experiment: int) -> FloatArray:
+        """Return the place."""
+        if not (fast := point.get('gear.ripple.fast', 0.0)):
+            return super().predict(point, experiment)
+        rest = {name: value for name, value in point.items() if name != 'gear.ripple.size'}
+        return np.asarray(super().predict(rest, experiment)
+                          + fast * np.sin(30.0 * TIME)[:, None])
+
+
+def test_an_everyday_size_is_no_way_to_take_another_form_of_its_effect_away() -> None:
+    machine = with_everyday(OfTwoForms()).linearised_at({'gear.ripple.size': 1.0})
+    name = 'everyday:gear.ripple.fast'
+    added = machine.predict({name: 0.02}, 0) - machine.predict({}, 0)
+    assert added[:, 0] == pytest.approx(0.02 * np.sin(30.0 * TIME), abs=1e-7)
