@@ -30,7 +30,7 @@ from dataclasses import dataclass
 import numpy as np
 from simgap.fit.least_squares import LeastSquares
 from simgap.fit.state import FitState, proper_precision
-from simgap.machine.contract import FloatArray
+from simgap.machine.contract import FloatArray, Form
 from simgap.search.hypothesis import Hypothesis
 from simgap.settings import EvidenceSettings
 
@@ -65,7 +65,7 @@ class Evidence:
         # what the nuisances have is that of all hypotheses, and their derivatives err
         occam = 0.5 * float(np.linalg.slogdet(scaled)[1]
                             - np.linalg.slogdet(scaled[np.ix_(shared, shared)])[1])
-        return float(self.log_prior(hypothesis) - state.cost / self.temperature - occam)
+        return float(-self.price(hypothesis.forms) - state.cost / self.temperature - occam)
 
     def _precision(self, state: FitState) -> FloatArray:
         """Return the precision of the priors; a size without one has that of a single sample."""
@@ -73,12 +73,11 @@ class Evidence:
         sizes = np.array([not p.prior_sigma and not p.is_shape for p in state.parameters], bool)
         return np.where(sizes & (one > 0.0), one, proper_precision(state.parameters))
 
-    def log_prior(self, hypothesis: Hypothesis) -> float:
-        """Return the logarithm of a hypothesis' prior probability, less what it has to pay."""
-        count, options = len(hypothesis.effects), self.settings
-        sought = options.sought * sum(form.scanned for form in hypothesis.forms)
-        shows = count * options.shows / self.scale ** 2
-        return -shows - sought - max(count - 1, 0) * self.price_of_form
+    def price(self, forms: Sequence[Form]) -> float:
+        """Return what a hypothesis has to pay for effects of these forms."""
+        sought = self.settings.sought * sum(form.scanned for form in forms)
+        shows = len(forms) * self.settings.shows / self.scale ** 2
+        return shows + sought + max(len(forms) - 1, 0) * self.price_of_form
 
     @property
     def price_of_form(self) -> float:

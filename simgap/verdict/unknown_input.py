@@ -44,11 +44,11 @@ def places(problem: LeastSquares, point: Mapping[str, float]) -> list[Place]:
     scales, channels = problem.machine.time_scales, problem.experiments[0].channels
     # name, part, evidence and share of the energy
     found = [(place.name, place.component, *evidence.weighed(_columns(
-        problem, point, place, evidence.residual)[0], problem, _SMOOTH)[:2])
+        problem, point, place, evidence.residual)[0], _rows_of(problem), _SMOOTH)[:2])
         for place in problem.machine.disturbance_inputs]
     found += [(f'reading of {channel}', channel, *evidence.weighed(
         [_pulses_of_reading(experiment, c, scales) for experiment in problem.experiments],
-        problem)[:2]) for c, channel in enumerate(channels)]
+        _rows_of(problem, c))[:2]) for c, channel in enumerate(channels)]
     # what repeats itself too fast for a pulse, such as a hum, lies in its reading
     most = 2.0 * max(share for *_, share in found)
     repeated = [(f'reading of {channel}', channel, *evidence.repeated(c, problem))
@@ -63,7 +63,7 @@ def courses(problem: LeastSquares, point: Mapping[str, float],
     """Return what would have to enter at a place, by test: times [s] and values, (m,) each."""
     evidence = _Evidence.at(problem, point)
     responses, times = _columns(problem, point, place, evidence.residual)
-    _, _, heights = evidence.weighed(responses, problem, _SMOOTH)
+    _, _, heights = evidence.weighed(responses, _rows_of(problem), _SMOOTH)
     found, first = [], 0
     for moments in times:
         found.append((moments, heights[first:first + moments.size]))
@@ -133,7 +133,7 @@ def _responses(experiment: Experiment, change: FloatArray, shift: float,
 
 
 def _pulses_of_reading(experiment: Experiment, channel: int, scales: TimeScales) -> FloatArray:
-    """Return pulses of a reading itself, one in each column, shape (n c, pulses)."""
+    """Return pulses of a reading itself, one in each column, shape (n, pulses)."""
     # the cost grows with the third power of their number
     first, last = float(experiment.time[0]), float(experiment.time[-1])
     rise = max(scales.pulse_s, (last - first) / _MOST_PULSES)
@@ -142,9 +142,16 @@ def _pulses_of_reading(experiment: Experiment, channel: int, scales: TimeScales)
     if experiment.colours:
         colour = experiment.colours[channel]
         pulses = np.array([whitened(pulse, colour) for pulse in pulses.T]).T
-    columns = np.zeros((*experiment.measured.shape, starts.size))
-    columns[:, channel, :] = pulses
-    return columns.reshape(-1, starts.size)
+    return pulses
+
+
+def _rows_of(problem: LeastSquares, channel: int | None = None) -> list[slice]:
+    """Return where the residuals of each test lie, or those of one channel in it."""
+    whole = [problem.rows(k) for k in range(len(problem.experiments))]
+    if channel is None:
+        return whole
+    return [slice(rows.start + channel, rows.stop, len(experiment.channels))
+            for rows, experiment in zip(whole, problem.experiments, strict=True)]
 
 
 class _Evidence:
@@ -181,13 +188,12 @@ class _Evidence:
                              - self._slope @ self._inverse @ self._slope)
         self._count = float(np.count_nonzero(weight))
 
-    def weighed(self, responses: Sequence[FloatArray], problem: LeastSquares,
+    def weighed(self, responses: Sequence[FloatArray], places: Sequence[slice],
                 smooth: Sequence[float] = (0.0,)) -> tuple[float, float, FloatArray]:
         """Return the evidence for an input, the explained share of the energy, and its factors."""
-        # `smooth` has times within which the input changes, in pulses
+        # responses in some rows of each test; `smooth` has times within which it changes, in pulses
         squares, slopes, crosses = [], [], []
-        for k, columns in enumerate(responses):
-            rows = problem.rows(k)
+        for columns, rows in zip(responses, places, strict=True):
             weighted = columns * self._weight[rows, np.newaxis]
             squares.append(columns.T @ weighted)
             slopes.append(weighted.T @ self.residual[rows])
