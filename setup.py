@@ -121,6 +121,8 @@ setup(
         'fmu': ['fmpy >= 0.3.22'],
         # the first release that can complete a chunk on demand
         'recording': ['mcap >= 1.5'],
+        # bags of other machines; the first rosbags that reads a storage file alone
+        'bags': ['mcap >= 1.5', 'rosbags >= 0.11', 'mcap-protobuf-support >= 0.5'],
         'test': [
             'cma >= 3.2',
             # pytest-xdist 3.8 finds a test's group by an attribute that pytest 9.2 does not read
@@ -131,7 +133,10 @@ setup(
             'hypothesis >= 6.80',
             'mypy >= 1.8',
             'types-PyYAML',
-            'rosbags >= 0.10',  # reads our bags, as someone else's program would
+            'rosbags >= 0.11',  # reads our bags, as someone else's program would
+            # recordings as other people's programs write them
+            'mcap-protobuf-support >= 0.5',
+            'pyarrow >= 10',
             # the page and the socket for Foxglove, and a client of both
             'tornado >= 6.1',
             'foxglove-sdk >= 0.30',

@@ -116,12 +116,12 @@ def machines_of(folder: Path, out: Path | None = None) -> list[FleetMachine]:
 
 
 def _recordings(folder: Path) -> list[Path]:
-    return sorted(path for path in folder.iterdir() if not path.name.startswith('.')
-                  and (path.suffix in ('.csv', '.mcap') or path.is_dir() and _is_bag(path)))
+    return sorted(path for path in folder.iterdir() if not path.name.startswith('.') and (
+        path.suffix in ('.csv', '.mcap', '.db3') or path.is_dir() and _is_bag(path)))
 
 
 def _is_bag(folder: Path) -> bool:
-    return any(folder.glob('*.mcap'))
+    return any(folder.glob('*.mcap')) or any(folder.glob('*.db3'))
 
 
 def diagnose_fleet(machines: Sequence[FleetMachine], out: Path, options: FleetOptions,

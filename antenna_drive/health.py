@@ -289,6 +289,7 @@ PARTS: dict[str, Callable[[], Iterator[Finding]]] = {
     **{part: _libraries(part, *modules) for part, modules in {
         'pages': ('jinja2',),
         'recording': ('mcap',),
+        'bags': ('mcap', 'rosbags', 'mcap_protobuf'),
         'plot': ('matplotlib',),
         'live': ('tornado',),
         'foxglove': ('foxglove',),

@@ -14,7 +14,6 @@ REMEDIES.update(dict.fromkeys((
     'sensor_msgs'), ROS_REMEDY))
 REMEDIES.update({
     'matplotlib': 'pip install matplotlib',
-    'mcap': 'pip install mcap',
     'cma': 'pip install cma',
     'distributed': "pip install 'dask[distributed]'",
     'shtab': 'pip install shtab',

@@ -7,7 +7,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 import math
 import os
-from pathlib import Path
 import subprocess
 import sys
 
@@ -15,7 +14,7 @@ from simgap.command.programs import PARENT
 
 
 def run_command(words: Sequence[str], limit_s: float = math.inf, memory_MB: float = math.inf,
-                folder: Path | None = None, program: str = 'antenna_drive') -> str:
+                program: str = 'antenna_drive') -> str:
     """
     Run a command of this installation; return what it said, for the case that it failed.
 
@@ -29,8 +28,6 @@ def run_command(words: Sequence[str], limit_s: float = math.inf, memory_MB: floa
         time after which it is ended [s]
     memory_MB
         what it may ask for; if it asks for more, it fails (Linux)
-    folder
-        its working folder
     program
         the module that has the command
 
@@ -41,7 +38,7 @@ def run_command(words: Sequence[str], limit_s: float = math.inf, memory_MB: floa
     """
     with subprocess.Popen(
             [sys.executable, '-m', program, *words], stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, cwd=folder,
+            stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
             env={**os.environ, PARENT: str(os.getpid())}) as process:
         if math.isfinite(memory_MB) and sys.platform.startswith('linux'):
             import resource

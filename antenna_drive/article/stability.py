@@ -17,8 +17,9 @@ from antenna_drive.parameters import Drive
 import numpy as np
 from scipy.optimize import brentq
 
-# A stable gain k' [1/s], at which the bias settles before it is disturbed.
-_SETTLING_GAIN = 45.4
+# A stable gain k' [1/s], at which the bias settles for this long before it is disturbed, and how
+# long the disturbance is observed [s].
+_SETTLING_GAIN, _SETTLED_S, _WATCHED_S = 45.4, 12.0, 6.0
 # The disturbance [V], so small that static friction keeps on holding the rotors.
 _DISTURBANCE = 1e-3
 # The limit is searched for within this share of the linear one, down to this width [1/s]. Far
@@ -29,19 +30,16 @@ _GAIN_WIDTH = 0.05
 _GAINS = (1.0, 1e4)
 
 
-def growth_rate(drive: Drive, gain: float, pole: float, step_s: float = MACRO_STEP,
-                settled_s: float = 12.0, watched_s: float = 6.0) -> float:
+def growth_rate(drive: Drive, gain: float, pole: float, step_s: float = MACRO_STEP) -> float:
     """
     Return the growth rate of a small disturbance of the steady torque bias [1/s].
 
     drive : with the old circuit
     gain, pole : k' and p of Filter 1 [1/s]
     step_s : macro-step [s]
-    settled_s : settling time at a stable gain before the disturbance [s]
-    watched_s : time over which the disturbance is observed [s]
     """
     emulator = Emulator(filter_variant(_SETTLING_GAIN, pole).applied_to(drive), step_s)
-    emulator.advance(round(settled_s / step_s))
+    emulator.advance(round(_SETTLED_S / step_s))
     # the voltage that keeps the present state steady at the new gain
     difference_gain = drive.torque_share.filter_1.difference_gain
     counter_torque = emulator.now[emulator.names.index('torque_share/counter_torque'), 0]
@@ -49,7 +47,7 @@ def growth_rate(drive: Drive, gain: float, pole: float, step_s: float = MACRO_ST
               + pole * counter_torque / gain)
     emulator.tune({'torque_share': {'filter_1.gain': gain, 'bias_source': 'fixed',
                                     'fixed_voltage': float(steady + _DISTURBANCE)}})
-    _, samples = emulator.advance(round(watched_s / step_s))
+    _, samples = emulator.advance(round(_WATCHED_S / step_s))
     difference = _difference(emulator, samples)
     swing = difference - difference.mean()
     # compare the second third with the last: the fast transients have decayed by then

@@ -27,22 +27,27 @@ from antenna_drive.cli.reading import refuse_none
 from antenna_drive.recording.bag_writer import write_bag
 from antenna_drive.recording.csv_format import read_csv
 from antenna_drive.recording.files import import_file, load_map
+from simgap.cli.diagnose import add_map_option
 from simgap.command.output import reading
+from simgap.errors import UserError
+from simgap.logs.bags import REMEDY
+from simgap.logs.tables import kind_of
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command understands."""
     parser.add_argument('csv', type=Path, metavar='FILE',
-                        help='the file to read: a CSV, or with --map also .npy, .npz, .mat, '
-                             '.json, .jsonl or .parquet')
+                        help='the file to read: a CSV, or with --map any that docs/recording.md '
+                             'lists, such as .mat, .parquet or a bag of another machine')
     parser.add_argument('bag', type=Path, metavar='BAG', help='the folder to write; it must not '
                                                               'be there yet')
-    parser.add_argument('--map', type=Path, metavar='MAP.yaml',
-                        help='which column is which signal, and how it is written')
+    add_map_option(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Read the file, write the bag."""
+    if not args.map and args.csv.exists() and kind_of(args.csv):
+        raise UserError(f'{args.csv}: no CSV, which needs a map. {REMEDY}')
     with reading():
         recording = (import_file(args.csv, load_map(args.map)) if args.map
                      else read_csv(args.csv))

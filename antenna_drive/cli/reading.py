@@ -8,8 +8,9 @@ import math
 from pathlib import Path
 
 from antenna_drive.recording.bam import read_bam
-from antenna_drive.recording.files import read_recording
+from antenna_drive.recording.files import import_file, load_map, read_recording
 from antenna_drive.recording.recording import Recording
+from simgap.cli.diagnose import add_map_option
 from simgap.command.output import reading
 from simgap.errors import UserError
 from simgap.logs.channel import Channel
@@ -18,7 +19,9 @@ from simgap.logs.channel import Channel
 def add_recording_options(parser: argparse.ArgumentParser) -> None:
     """Add the recording to read, `--partial`, and `--from` and `--to` to read a part."""
     parser.add_argument('recording', metavar='RECORDING',
-                        help='a bag (folder or .mcap), a .csv, or a servo log (.json)')
+                        help='a bag (folder or .mcap), a .csv, or a servo log (.json); with --map '
+                             'any file that docs/recording.md lists')
+    add_map_option(parser)
     parser.add_argument('--partial', action='store_true',
                         help='take what can be read of a bag that was cut off, and say how far')
     parser.add_argument('--from', dest='start', type=float, default=-math.inf, metavar='S',
@@ -38,8 +41,12 @@ def read(args: argparse.Namespace) -> Recording:
     """Read the recording that the options name; UserError says what is wrong with it."""
     with reading():
         # a servo's log belongs to its machine, which the room of recordings does not know
-        recording = (read_bam(args.recording) if Path(args.recording).suffix == '.json'
-                     else read_recording(args.recording, partial=args.partial))
+        if args.map:
+            recording = import_file(args.recording, load_map(args.map))
+        elif Path(args.recording).suffix == '.json':
+            recording = read_bam(args.recording)
+        else:
+            recording = read_recording(args.recording, partial=args.partial)
     if args.start > -math.inf or args.end < math.inf:
         recording = recording.between(args.start, args.end)
     refuse_none(args.recording, recording.channels.values())

@@ -1,25 +1,38 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""The tests that the drive may run, as the design of the next test asks for them."""
+"""
+The tests that the drive may run, as the design of the next test asks for them.
+
+They are waveforms of several families, with their amplitudes and periods.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from antenna_drive.diagnosis.candidate_tests import drawn, FAMILIES, nearby
 from antenna_drive.diagnosis.drive_limits import CHANNELS, DriveLimits
 from antenna_drive.diagnosis.excitation import SheetCommand
+from antenna_drive.diagnosis.field_recording import SAMPLE_RATE
 from antenna_drive.diagnosis.machine import AntennaMachine
 from antenna_drive.diagnosis.planned_tests import planned
 from antenna_drive.parameters.sets import Drive
-from antenna_drive.recording.sheet import dump_sheet, sheet_tree, TestSheet
+from antenna_drive.recording.sheet import (
+    Chirp, CircuitBias, dump_sheet, FixedBias, Knots, Multisine, sheet_tree, Square, TestSheet,
+    Triangle, Waveform,
+)
 import numpy as np
 from simgap.machine.contract import FloatArray, Machine, Point
 from simgap.next_test.space import TestSpace
 
+# Everything stands still for this long at the beginning [s].
+_REST_S = 1.0
+_LEAST_SHARE, _SLOWEST_HZ, _FASTEST_HZ = 0.01, 0.05, 8.0
+# Voltages of a bias source, as shares of the circuit's greatest; rates of a torque test, as shares
+# of the greatest; elevations [deg].
+_BIAS, _CREEP, _ELEVATIONS = (0.2, 0.9), (0.002, 0.05), (15.0, 75.0)
 # Of the curve of a command [Hz].
 _DRAWN_HZ = 200.0
 # Signals that no sensor of a test reads, and the sensor that would.
@@ -32,6 +45,104 @@ _UNREAD = {
 }
 
 
+class _Draw:
+    """Numbers of a test, drawn at random."""
+
+    def __init__(self, limits: DriveLimits, duration: float, random: np.random.Generator) -> None:
+        self.limits, self.duration, self.random = limits, duration, random
+
+    def between(self, low: float, high: float) -> float:
+        """Return a number whose logarithm is spread evenly, rounded as people write it."""
+        return _rounded(float(np.exp(self.random.uniform(np.log(low), np.log(high)))))
+
+    @property
+    def amplitude(self) -> float:
+        """Return an amplitude of the rate [deg/s]."""
+        return self.between(_LEAST_SHARE * self.limits.rate_deg_s, self.limits.rate_deg_s)
+
+    @property
+    def period(self) -> float:
+        """Return a period of which the test holds three [s]."""
+        return self.between(0.7, self.duration / 3.0)
+
+
+def _rounded(value: float) -> float:
+    """Return a number with four digits, as a sheet is to be read by people."""
+    return float(f'{value:.4g}')
+
+
+def _chirp(draw: _Draw) -> Waveform:
+    first = draw.between(_SLOWEST_HZ, 1.0)
+    return Chirp(draw.amplitude, first, draw.between(2.0 * first, _FASTEST_HZ),
+                 draw.duration - 2.0 * _REST_S, _REST_S)
+
+
+def _multisine(draw: _Draw) -> Waveform:
+    count = int(draw.random.integers(4, 13))
+    frequencies = np.geomspace(draw.between(_SLOWEST_HZ, 0.5), draw.between(1.0, _FASTEST_HZ),
+                               count)
+    tilt = draw.random.uniform(0.0, 1.0)
+    weights = (frequencies / frequencies[0]) ** -tilt
+    # the greatest value of sines with random phases is about twice their rms
+    weights /= np.sqrt(2.0 * np.sum(weights ** 2))
+    phases = draw.random.uniform(0.0, 2.0 * np.pi, count)
+    return Multisine(draw.amplitude, _numbers(frequencies), _numbers(weights), _numbers(phases),
+                     _REST_S)
+
+
+def _numbers(values: FloatArray) -> tuple[float, ...]:
+    return tuple(map(_rounded, values.tolist()))
+
+
+def _levels(draw: _Draw, times: FloatArray, levels: FloatArray) -> Knots:
+    """Return a command that jumps to each level at its time, and ends at zero."""
+    times = np.r_[times, draw.duration - _REST_S]
+    return Knots(_numbers(np.repeat(times, 2)[1:-1]), _numbers(np.repeat(levels, 2)))
+
+
+def _steps(draw: _Draw) -> Waveform:
+    hold = draw.between(1.0, draw.duration / 5.0)
+    times = np.arange(_REST_S, draw.duration - _REST_S - 0.5 * hold, hold)[:30]
+    greatest = draw.amplitude
+    shares = draw.random.choice([-1.0, -0.5, -0.2, -0.05, 0.0, 0.05, 0.2, 0.5, 1.0], times.size)
+    # a test that begins with a long rest wastes time
+    shares[0] = shares[0] or 1.0
+    return _levels(draw, times, greatest * shares)
+
+
+def _prbs(draw: _Draw) -> Waveform:
+    bit = draw.between(draw.duration / 30.0, draw.duration / 10.0)
+    times = np.arange(_REST_S, draw.duration - _REST_S - 0.5 * bit, bit)[:30]
+    return _levels(draw, times, draw.amplitude * draw.random.choice([-1.0, 1.0], times.size))
+
+
+def _slews(draw: _Draw) -> Waveform:
+    """Return trapezoids: to one side and back, with slopes and pauses between."""
+    rate, ramp = draw.amplitude, draw.between(0.2, 2.0)
+    hold = draw.between(0.5, draw.duration / 6.0)
+    times, rates, sign = [_REST_S], [0.0], 1.0
+    while (at := times[-1]) + 2.0 * ramp + 2.0 * hold < draw.duration - _REST_S and (
+            len(times) < 56):
+        times += [at + ramp, at + ramp + hold, at + 2.0 * ramp + hold, at + 2.0 * (ramp + hold)]
+        rates += [sign * rate, sign * rate, 0.0, 0.0]
+        sign = -sign
+    return Knots(_numbers(np.array(times)), _numbers(np.array(rates)))
+
+
+def _torque(draw: _Draw) -> Waveform:
+    """Return a creep to both sides: the torque of the bias source is what moves the drive."""
+    rate = draw.limits.rate_deg_s * draw.between(*_CREEP)
+    times = np.linspace(_REST_S, draw.duration, 5)[:4]
+    return _levels(draw, times, rate * np.array([1.0, 0.0, -1.0, 0.0]))
+
+
+FAMILIES: Mapping[str, Callable[[_Draw], Waveform]] = {
+    'square': lambda draw: Square(draw.amplitude, draw.period, 0.25),
+    'triangle': lambda draw: Triangle(draw.amplitude, draw.period, 0.0),
+    'chirp': _chirp, 'multisine': _multisine, 'steps': _steps, 'prbs': _prbs, 'slews': _slews,
+    'torque': _torque}
+
+
 class AntennaTests(TestSpace):
     """
     The tests that the drive may run.
@@ -41,32 +152,51 @@ class AntennaTests(TestSpace):
     drive : the configuration
     limits : of the drive
     duration : of a test [s]
-    rate : at which it is simulated, samples per second [Hz]
     """
 
     families = tuple(FAMILIES)
 
     def __init__(self, base: TestSheet, drive: Drive, limits: DriveLimits,
-                 duration: float = 30.0, rate: float = 70.0) -> None:
+                 duration: float = 30.0) -> None:
         """Take what all the tests have in common."""
         # the waveform is what is looked for; a proposal is a test from rest
         self._base = replace(base, waveform=None, start='rest')
         self._drive, self._limits = drive, limits
-        self._duration, self._rate = duration, rate
+        self._duration = duration
         self.limits = limits.as_data()
 
     def draw(self, family: str, random: np.random.Generator) -> TestSheet:
         """Return the sheet of a test of a family."""
-        return drawn(family, self._base, self._limits,
-                     self._drive.torque_share.circuit.saturation_high, self._duration, random)
+        draw, base = _Draw(self._limits, self._duration, random), self._base
+        sheet = replace(base, waveform=FAMILIES[family](draw))
+        if random.uniform() < 0.5:
+            sheet = replace(sheet, elevation_deg=round(float(random.uniform(*_ELEVATIONS)), 1))
+        if family == 'torque':
+            # the source steps when the test begins
+            return replace(sheet, bias=FixedBias(_rounded(
+                self._drive.torque_share.circuit.saturation_high * draw.between(*_BIAS))))
+        if isinstance(base.bias, CircuitBias) and base.bias.bias_pot is not None:
+            return _with_pot(sheet, float(random.choice([0.4, 0.7, 1.0, 1.2])))
+        return sheet
 
     def nearby(self, family: str, test: Any, random: np.random.Generator) -> TestSheet:
-        """Return the sheet of a test like another one."""
-        return nearby(test, random)
+        """Return a test like another one: its amplitude, times or bias a little different."""
+        waveform, scale = test.waveform, float(np.exp(random.normal(0.0, 0.25)))
+        which, name = random.integers(3), 'amplitude_deg_s'
+        if which == 0 and isinstance(test.bias, CircuitBias) and test.bias.bias_pot:
+            return _with_pot(test, scale)
+        if isinstance(waveform, Knots):
+            assert waveform.rates_deg_s is not None
+            return replace(test, waveform=replace(waveform, rates_deg_s=tuple(
+                _rounded(scale * rate) for rate in waveform.rates_deg_s)))
+        if which == 1 and isinstance(waveform, (Square, Triangle)) and waveform.period_s:
+            name = 'period_s'
+        return replace(test, waveform=replace(
+            waveform, **{name: _rounded(scale * getattr(waveform, name))}))
 
     def machine(self, test: Any) -> AntennaMachine:
         """Return the drive in one test."""
-        return AntennaMachine({'next': planned(test, self._duration, self._rate)}, self._drive,
+        return AntennaMachine({'next': planned(test, self._duration, SAMPLE_RATE)}, self._drive,
                               threads=1)
 
     def use(self, machine: Machine, points: Sequence[Point]) -> Mapping[str, float]:
@@ -96,6 +226,13 @@ class AntennaTests(TestSpace):
         size = np.sqrt(np.mean((first - first.mean(axis=0)) ** 2, axis=0))
         off = np.sqrt(np.mean((second - first) ** 2, axis=0)) / np.maximum(size, 1e-12)
         return dict(zip(_UNREAD.values(), off.tolist(), strict=True))
+
+
+def _with_pot(sheet: TestSheet, scale: float) -> TestSheet:
+    """Return a test whose bias pot is set to some times as much."""
+    bias = sheet.bias
+    assert isinstance(bias, CircuitBias) and bias.bias_pot is not None
+    return replace(sheet, bias=replace(bias, bias_pot=_rounded(min(bias.bias_pot * scale, 1.0))))
 
 
 def _outputs(machine: Machine, point: Point,

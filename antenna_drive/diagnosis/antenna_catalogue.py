@@ -8,12 +8,18 @@ from collections.abc import Iterable, Sequence
 
 from antenna_drive.diagnosis.catalogue import DIGITS_SEEN
 from antenna_drive.diagnosis.modifiers import KnownModifiers
-from antenna_drive.diagnosis.wave_orders import likely_orders
 from antenna_drive.diagnosis.waves import Wave
+from antenna_drive.readings import AT
+import numpy as np
+from scipy.ndimage import median_filter
 from simgap.machine.contract import Catalogue, Effect, Experiment, FloatArray, Form
 
 # Numbers of cycles per revolution that are tried of each wave.
 _ORDERS = 3
+# Time within which the integral of a tachometer does not drift [s].
+_WINDOW_S = 1.5
+# Number of orders about one that say what is usual there.
+_NEIGHBOURS = 9
 
 
 class AntennaCatalogue(Catalogue):
@@ -34,14 +40,11 @@ class AntennaCatalogue(Catalogue):
     def forms(self, effect: Effect, experiments: Sequence[Experiment],
               residuals: Sequence[FloatArray]) -> Sequence[Form]:
         """Return an effect's forms; those of a wave with its likeliest orders."""
-        found: list[Form] = []
-        for form in effect.forms:
-            if isinstance(form, Wave):
-                found += [self.wave_at(form, order) for order in likely_orders(
-                    form, experiments, residuals, _ORDERS)]
-            else:
-                found.append(form)
-        return found
+        form = effect.forms[0]
+        if isinstance(form, Wave):
+            return [self.wave_at(form, order) for order in likely_orders(
+                form, experiments, residuals, _ORDERS)]
+        return effect.forms
 
     def typical_form(self, effect: Effect) -> Form:
         """Return the first form of an effect; of a wave, one of a middle order."""
@@ -71,3 +74,71 @@ class AntennaCatalogue(Catalogue):
         wave = form.at(order)
         self._modifiers.register(wave.parameters)
         return wave
+
+
+def likely_orders(form: Wave, experiments: Sequence[Experiment],
+                  residuals: Sequence[FloatArray], count: int) -> list[float]:
+    """
+    Return the orders that stand out most in the residuals.
+
+    The first stands out most from its neighbours, which a misfit without a period does not do.
+    The second holds most of the energy. The others follow in turn.
+
+    form : of the wave: the angle it follows, and the channels it shows in
+    experiments : the tests
+    residuals : in the readings' own units, shape (n, c) for each test
+    count : how many
+    """
+    orders = np.array(form.orders)
+    energy = np.zeros(orders.size)
+    peak = np.zeros(orders.size)
+    for experiment, residual in zip(experiments, residuals, strict=True):
+        scores = _scores(form, experiment, residual, orders)
+        usual = median_filter(scores, _NEIGHBOURS, mode='nearest') + 1e-9
+        energy += scores
+        # a score is a sum of squares, whose scatter is its square root
+        peak += np.maximum(scores - usual, 0.0) / np.sqrt(usual * max(1.0, float(usual.mean())))
+    found: list[float] = []
+    ranks = [list(np.argsort(by)[::-1]) for by in (peak, energy)]
+    while len(found) < count and any(ranks):
+        rank = ranks[len(found) % 2] or ranks[0]
+        order = float(orders[rank.pop(0)])
+        near = form.shape.angle == 'axis' and any(abs(np.log(order / f)) < 0.15 for f in found)
+        if order not in found and not near:
+            found.append(order)
+    return found
+
+
+def _scores(form: Wave, experiment: Experiment, residual: FloatArray,
+            orders: FloatArray) -> FloatArray:
+    """Return the power of a residual at each order, shape (m,)."""
+    clean = np.nan_to_num(residual / experiment.noise)
+    time = experiment.time
+    score = np.zeros(orders.size)
+    if form.shape.angle == 'axis':
+        angle = np.nan_to_num(experiment.measured[:, AT['encoder']])
+        if form.shape.stem == 'cyclic_error':
+            return _power(clean[:, AT['encoder']], angle, orders)
+        rate = np.gradient(angle, time)
+        moving = np.abs(rate) > 0.1 * np.abs(rate).max()
+        load = clean[:, AT['current_1']] + clean[:, AT['current_2']]
+        return _power(load * np.sign(rate) * moving, angle, orders)
+    windows = (time / _WINDOW_S).astype(int)
+    for path in form.shape.paths:
+        m = path.partition('.')[0][-1]
+        rate = np.nan_to_num(experiment.measured[:, AT[f'tach_{m}']])
+        angle = np.r_[0.0, np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(time))]
+        for channel in (AT[f'current_{m}'], AT[f'tach_{m}']):
+            for w in range(windows[-1] + 1):
+                inside = windows == w
+                if np.count_nonzero(inside) >= 10:
+                    score += _power(clean[inside, channel], angle[inside], orders)
+    return score
+
+
+def _power(signal: FloatArray, angle: FloatArray, orders: FloatArray) -> FloatArray:
+    """Return the power of a signal in waves of an angle, without their means, shape (m,)."""
+    wave = np.exp(-1j * np.outer(orders, angle))
+    wave -= wave.mean(axis=1, keepdims=True)
+    power = np.sum(np.abs(wave) ** 2, axis=1) + 1e-3
+    return np.asarray(np.abs(wave @ (signal - signal.mean())) ** 2 / power)

@@ -9,13 +9,14 @@ are then fed with the recorded currents.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence, Set
 from dataclasses import dataclass, fields, replace
+from functools import cache
 from itertools import product
 from typing import Any
 
-from antenna_drive.diagnosis.circuits import constants
 from antenna_drive.diagnosis.field_recording import FieldRecording, Note
+from antenna_drive.diagnosis.sheet_settings import CIRCUITS, constants
 from antenna_drive.parameters.sets import changed, Drive, TorqueShare
 from antenna_drive.recording.sheet import CircuitBias, FixedBias, FixedStepBias
 import numpy as np
@@ -23,7 +24,6 @@ from scipy.signal import lfilter
 from simgap.machine.contract import FloatArray
 
 CURRENTS = ('current_1', 'current_2')
-CIRCUITS = ('new', 'old')
 STARTS = ('steady', 'zero')
 # The best value is taken if the next one fits worse by this factor, and a value of a sheet is
 # doubted if the best one fits better by this one.
@@ -53,6 +53,36 @@ def with_entries(recording: FieldRecording, **entries: Any) -> FieldRecording:
 def of_table(entry: str, drive: Drive) -> bool:
     """Return whether the configured constants are those of either column of Table 1."""
     return any(changed(drive, constants(entry, name)) == drive for name in CIRCUITS)
+
+
+def told(entry: str, misfit: Callable[[str | None], float], given: Set[str | None], drive: Drive,
+         note: Note, evidence: str, undecided: str) -> str | None:
+    """
+    Return the column of Table 1 that recordings tell: '' for either, None for as configured.
+
+    entry : of a sheet, 'circuit' or 'filter_1'
+    misfit : returns how far off the constants of a column are, those configured for None
+    given : what the sheets give, which is believed
+    drive : the configuration
+    note : called with what was inferred, or contradicts a sheet
+    evidence, undecided : what the misfit is of, and what holds for either, for people
+    """
+    best, other = sorted(CIRCUITS, key=misfit)
+    worse = misfit(other) / misfit(best)
+    if given:
+        if given == {other} and worse > DOUBT:
+            note(f'the sheets give {entry} {other}, {evidence} like {best} ({other} fits '
+                 f'{worse:.1f} times worse); the sheets are believed')
+        return next(iter(given))
+    if not of_table(entry, drive) and misfit(None) <= CLEAR * misfit(best):
+        note(f'{entry}: the configured constants fit as well: as configured')
+        return None
+    if worse < CLEAR:
+        note(f'{entry}: {other} fits {worse:.2f} times worse than {best}, which tells nothing; '
+             f"{undecided}, unless a sheet says '{entry}: {best}' or '{entry}: {other}'")
+        return ''
+    note(f'{entry} {best}: inferred, {other} fits {worse:.1f} times worse')
+    return best
 
 
 # -- the source of the bias --------------------------------------------------------------------
@@ -203,28 +233,12 @@ def with_circuit(recordings: list[FieldRecording], drive: Drive,
     if not fed:
         return recordings
     found = list(recordings)
-    fits = {circuit: _fit([recordings[k] for k in fed], circuit, drive) for circuit in CIRCUITS}
-    best, other = sorted(CIRCUITS, key=lambda name: fits[name].misfit)
-    worse = fits[other].misfit / fits[best].misfit
-    given = {recordings[k].sheet.circuit for k in fed} - {None}
-    if given == {other} and worse > DOUBT:
-        note(f'the sheets give circuit {other}, the recorded bias voltage looks like {best} '
-             f'({other} fits {worse:.1f} times worse); the sheets are believed')
-    named: str | None = best
-    if given:
-        named = str(next(iter(given)))
-    elif worse < CLEAR:
-        # so small a load leaves either circuit at its limit, where they give the same voltage
-        named = None
-        note(f'circuit: {other} fits {worse:.2f} times worse than {best}, which tells nothing; '
-             f"as Filter 1, unless a sheet says 'circuit: {best}' or 'circuit: {other}'")
-    else:
-        note(f'circuit {best}: inferred, {other} fits {worse:.1f} times worse')
-    fit = fits[named or best]
-    own = _fit([recordings[k] for k in fed], None, drive)
-    if not given and own.misfit <= CLEAR * fit.misfit and not of_table('circuit', drive):
-        named, fit = None, own
-        note('circuit: the configured constants fit as well: as configured')
+    fit_of = cache(lambda circuit: _fit([recordings[k] for k in fed], circuit, drive))
+    # so small a load may leave either circuit at its limit, where they give the same voltage
+    named = told('circuit', lambda circuit: fit_of(circuit).misfit,
+                 {recordings[k].sheet.circuit for k in fed} - {None}, drive, note,
+                 'the recorded bias voltage looks', 'as Filter 1')
+    fit = min(map(fit_of, CIRCUITS), key=lambda fit: fit.misfit) if named == '' else fit_of(named)
     for k, setting, pot, start in zip(fed, fit.settings, fit.pots, fit.starts, strict=True):
         bias = recordings[k].sheet.bias
         assert isinstance(bias, CircuitBias)
@@ -243,7 +257,7 @@ def with_circuit(recordings: list[FieldRecording], drive: Drive,
                 f'{name} {value}' for name, value in added.items()) + f': inferred{known}')
         found[k] = with_entries(recordings[k], bias=replace(bias, **added))
     # what one recording tells holds for the whole machine
-    return [with_entries(recording, circuit=recording.sheet.circuit or named)
+    return [with_entries(recording, circuit=recording.sheet.circuit or named or None)
             for recording in found]
 
 

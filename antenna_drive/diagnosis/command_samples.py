@@ -11,6 +11,7 @@ halfway between the samples.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import product
 
 import numpy as np
@@ -57,165 +58,164 @@ class Jumps:
     left: FloatArray
     right: FloatArray
 
+
+@dataclass(frozen=True)
+class CommandCorners:
+    """
+    Where two straight lines of a command meet between two samples.
+
+    sample, time : number of the sample before each corner, and its time, shape (m,) [s]
+    before, after : slopes on both sides, shape (m,) [rad/s^2]
+    """
+
+    sample: NDArray[np.int64]
+    time: FloatArray
+    before: FloatArray
+    after: FloatArray
+
+
+@dataclass(frozen=True)
+class CommandSamples:
+    """
+    The samples of a command, and what lies in the n - 1 intervals between them.
+
+    time, value : shape (n,) [s], [rad/s]
+    """
+
+    time: FloatArray
+    value: FloatArray
+
+    @cached_property
+    def _slope(self) -> FloatArray:
+        return np.diff(self.value) / np.diff(self.time)
+
+    @cached_property
+    def uncertainty(self) -> FloatArray:
+        """
+        Return by how much the two sides of each interval part in its middle [rad/s].
+
+        Each side is taken on as a line and as a parabola. It is NaN where no rows are missing.
+        """
+        time, width = self.time, np.diff(self.time)
+        found = np.full(width.size, np.nan)
+        for i in np.flatnonzero(width > _LACKS_ROWS * np.median(width)).tolist():
+            middle = 0.5 * (time[i] + time[i + 1])
+            apart = (abs(self._through(i - n, i)(middle) - self._through(i + 1, i + 1 + n)(middle))
+                     for n in (1, 2) if n <= i < width.size - n)
+            found[i] = min(apart, default=0.0)
+        return found
+
+    def _through(self, first: int, last: int) -> Polynomial:
+        """Return the polynomial through a few samples."""
+        few = slice(first, last + 1)
+        return Polynomial.fit(self.time[few], self.value[few], last - first)
+
     @property
-    def cut_off(self) -> NDArray[np.bool_]:
-        """Return which jumps cut a motion off, or begin one, shape (k,)."""
-        return np.asarray(self.left.any(axis=1) | self.right.any(axis=1))
+    def _uncertain(self) -> NDArray[np.bool_]:
+        """Return which intervals are not told by those around them."""
+        return np.asarray(self.uncertainty > _UNCERTAIN * np.ptp(self.value))
 
+    @cached_property
+    def jumps(self) -> Jumps:
+        """Return where the command jumps."""
+        change = np.abs(np.diff(self.value))
+        usual = np.median(change) + 1e-12
+        around = np.maximum(np.r_[change[1:], 0.0], np.r_[0.0, change[:-1]])
+        large = ((change > _OF_RANGE * np.ptp(self.value)) & (change > _OF_USUAL * usual)
+                 & (change > _OF_NEIGHBOURS * around))
+        # straight lines go on where rows are missing, and curves turn in it
+        lacks_rows = ~np.isnan(self.uncertainty)
+        large &= ~lacks_rows | (self._uncertain & self._level)
+        # parabolas up to the jump that ends a motion, and from the one that begins it; a slope
+        # found backwards has the other sign, its change has not
+        left = self._cut_off()
+        right = CommandSamples(-self.time[::-1], self.value[::-1])._cut_off()[::-1] * [-1.0, 1.0]
+        left[lacks_rows] = right[lacks_rows] = 0.0
+        k = np.flatnonzero(large | left.any(axis=1) | right.any(axis=1))
+        return Jumps(k, regular_times(self.time[k], self.time[k + 1])[0], left[k], right[k])
 
-def jumps_of(time: FloatArray, value: FloatArray, uncertainty: FloatArray) -> Jumps:
-    """
-    Find where a command jumps.
+    @property
+    def _level(self) -> NDArray[np.bool_]:
+        """Return which intervals have straight lines on both sides."""
+        bend = np.abs(np.diff(self._slope, prepend=self._slope[:1]))
+        # between the two intervals before, and between the two behind
+        before, behind = np.r_[0.0, bend[:-1]], np.r_[bend[2:], 0.0, 0.0]
+        return np.asarray(np.maximum(before, behind) * np.diff(self.time)
+                          < _STRAIGHT * np.abs(np.diff(self.value)))
 
-    time, value : of its samples, shape (n,) [s], [rad/s]
-    uncertainty : from `uncertainty_of`
-    """
-    change = np.abs(np.diff(value))
-    usual = np.median(change) + 1e-12
-    around = np.maximum(np.r_[change[1:], 0.0], np.r_[0.0, change[:-1]])
-    large = ((change > _OF_RANGE * np.ptp(value)) & (change > _OF_USUAL * usual)
-             & (change > _OF_NEIGHBOURS * around))
-    # straight lines go on where rows are missing, and curves turn in it
-    lacks_rows = ~np.isnan(uncertainty)
-    large &= ~lacks_rows | (_uncertain(value, uncertainty) & _level(time, value))
-    # parabolas up to the jump that ends a motion, and from the one that begins it; a slope that is
-    # found backwards has the other sign, its change has not
-    left = _cut_off(time, value)
-    right = _cut_off(-time[::-1], value[::-1])[::-1] * [-1.0, 1.0]
-    left[lacks_rows] = right[lacks_rows] = 0.0
-    k = np.flatnonzero(large | left.any(axis=1) | right.any(axis=1))
-    return Jumps(k, regular_times(time[k], time[k + 1])[0], left[k], right[k])
+    def _cut_off(self) -> FloatArray:
+        """
+        Return how a motion goes on that jumps to where the command stands still, shape (n - 1, 2).
 
+        First and second derivative at the beginning of the interval in which it jumps [rad/s^2],
+        [rad/s^3]; 0 for all other intervals. A motion that comes to rest by itself reaches that
+        value between the last sample that moves and the first that does not.
+        """
+        time, value = self.time, self.value
+        found = np.zeros((time.size - 1, 2))
+        still = np.diff(value) == 0.0
+        ends = ~still
+        for n in range(1, _STILL):
+            ends[-n:] = False
+            ends[:-n] &= still[n:]
+        for k in (np.flatnonzero(ends[2:] & ~still[1:-1] & ~still[:-2]) + 2).tolist():
+            line, parabola = (self._through(k - n, k) for n in (1, 2))
+            places = np.linspace(time[k], time[k + 1], 9)
+            above = np.r_[line(places), parabola(places)] - value[k + 1]
+            if max(above.min(), -above.max()) > _NEAR * np.ptp(value):
+                found[k] = [parabola.deriv(n)(time[k]) for n in (1, 2)]
+        return found
 
-def holes_of(time: FloatArray, value: FloatArray, uncertainty: FloatArray, jumps: Jumps,
-             ) -> NDArray[np.int64]:
-    """
-    Return the intervals whose rows are missing and not told by those around them, shape (h,).
+    @property
+    def holes(self) -> NDArray[np.int64]:
+        """
+        Return the intervals whose rows are missing and not told by those around them, shape (h,).
 
-    An interval with a jump or a corner is none of them.
+        An interval with a jump or a corner is none of them.
+        """
+        found = self._uncertain
+        found[self.jumps.interval] = False
+        found[self.corners.sample] = False
+        return np.flatnonzero(found)
 
-    time, value, uncertainty, jumps : as in `jumps_of`, and what it has found
-    """
-    found = _uncertain(value, uncertainty)
-    found[jumps.interval] = False
-    found[corners_of(time, value)[0]] = False
-    return np.flatnonzero(found)
+    @cached_property
+    def corners(self) -> CommandCorners:
+        """Return where two straight lines meet between two samples."""
+        time, slope = self.time, self._slope
+        k = np.arange(2, slope.size - 2)
+        before, after = slope[k - 1], slope[k + 1]
+        bend = np.abs(after - before)
+        straight = np.maximum(np.abs(before - slope[k - 2]), np.abs(slope[k + 2] - after))
+        with np.errstate(divide='ignore', invalid='ignore'):
+            share = (slope[k] - after) / (before - after)
+        # a corner on a sample is known as it is
+        found = ((straight < _STRAIGHT * bend)
+                 & (share > _ON_A_SAMPLE) & (share < 1.0 - _ON_A_SAMPLE))
+        at = time[k] + share * (time[k + 1] - time[k])
+        return CommandCorners(k[found], at[found], before[found], after[found])
 
+    @property
+    def slopes(self) -> FloatArray:
+        """
+        Return the slopes at both ends of each interval, shape (n - 1, 2) [rad/s^2].
 
-def slopes_of(time: FloatArray, value: FloatArray, jumps: Jumps) -> FloatArray:
-    """
-    Return the slopes at both ends of each interval, shape (n - 1, 2) [rad/s^2].
-
-    An interval beside a jump or a corner is straight. Those of a jump itself mean nothing.
-
-    time, value, jumps : as in `holes_of`
-    """
-    k, left, right = jumps.interval, jumps.left[:, 0], jumps.right[:, 0]
-    slopes = np.tile((np.diff(value) / np.diff(time))[:, np.newaxis], 2)
-    smooth = _smooth(time, value)
-    # the curve beside a motion that is cut off is no corner
-    smooth[k[left != 0.0] - 1] = True
-    smooth[k[right != 0.0] + 1] = True
-    gradient, cut = np.gradient(value, time), jumps.cut_off
-    gradient[k[cut]] = left[cut]
-    gradient[k[cut] + 1] = right[cut]
-    slopes[smooth] = np.stack([gradient[:-1], gradient[1:]], axis=1)[smooth]
-    return slopes
-
-
-def _cut_off(time: FloatArray, value: FloatArray) -> FloatArray:
-    """
-    Return how a motion goes on that jumps to where the command stands still, shape (n - 1, 2).
-
-    First and second derivative at the beginning of the interval in which it jumps [rad/s^2],
-    [rad/s^3]; 0 for all other intervals. A motion that comes to rest by itself reaches that value
-    between the last sample that moves and the first that does not.
-    """
-    found = np.zeros((time.size - 1, 2))
-    still = np.diff(value) == 0.0
-    ends = ~still
-    for n in range(1, _STILL):
-        ends[-n:] = False
-        ends[:-n] &= still[n:]
-    for k in np.flatnonzero(ends[2:] & ~still[1:-1] & ~still[:-2]) + 2:
-        line, parabola = (_through(time[k - n:k + 1], value[k - n:k + 1]) for n in (1, 2))
-        places = np.linspace(time[k], time[k + 1], 9)
-        above = np.r_[line(places), parabola(places)] - value[k + 1]
-        if max(above.min(), -above.max()) > _NEAR * np.ptp(value):
-            found[k] = [parabola.deriv(n)(time[k]) for n in (1, 2)]
-    return found
-
-
-def uncertainty_of(time: FloatArray, value: FloatArray) -> FloatArray:
-    """
-    Return by how much the two sides of each interval part in its middle, shape (n - 1,).
-
-    Each side is taken on as a line and as a parabola. It is NaN where no rows are missing.
-    """
-    width = np.diff(time)
-    uncertainty = np.full(width.size, np.nan)
-    for i in np.flatnonzero(width > _LACKS_ROWS * np.median(width)):
-        middle = 0.5 * (time[i] + time[i + 1])
-        apart = (abs(_through(time[i - n:i + 1], value[i - n:i + 1])(middle)
-                     - _through(time[i + 1:i + 2 + n], value[i + 1:i + 2 + n])(middle))
-                 for n in (1, 2) if n <= i < width.size - n)
-        uncertainty[i] = min(apart, default=0.0)
-    return uncertainty
-
-
-def _through(time: FloatArray, value: FloatArray) -> Polynomial:
-    """Return the polynomial through a few samples."""
-    return Polynomial.fit(time, value, time.size - 1)
-
-
-def _uncertain(value: FloatArray, uncertainty: FloatArray) -> NDArray[np.bool_]:
-    """Return which intervals are not told by those around them, shape (n - 1,)."""
-    return np.asarray(uncertainty > _UNCERTAIN * np.ptp(value))
-
-
-def _level(time: FloatArray, value: FloatArray) -> NDArray[np.bool_]:
-    """Return which intervals have straight lines on both sides, shape (n - 1,)."""
-    slope = np.diff(value) / np.diff(time)
-    bend = np.abs(np.diff(slope, prepend=slope[:1]))
-    # between the two intervals before, and between the two behind
-    before, behind = np.r_[0.0, bend[:-1]], np.r_[bend[2:], 0.0, 0.0]
-    return np.asarray(np.maximum(before, behind) * np.diff(time)
-                      < _STRAIGHT * np.abs(np.diff(value)))
-
-
-def _smooth(time: FloatArray, value: FloatArray) -> NDArray[np.bool_]:
-    """Return which intervals between samples are beside no jump and no corner, shape (n - 1,)."""
-    slope = np.diff(value) / np.diff(time)
-    bend = np.abs(np.r_[0.0, np.diff(slope), 0.0])
-    # a bend that stands alone is a corner: the samples two further on know nothing of it
-    padded = np.pad(bend, 2)
-    corner = bend > _CORNER * np.maximum(padded[:-4], padded[4:])
-    return ~(corner[1:] | corner[:-1])
-
-
-def corners_of(time: FloatArray, value: FloatArray,
-               ) -> tuple[NDArray[np.int64], FloatArray, FloatArray, FloatArray]:
-    """
-    Return where two straight lines meet between two samples.
-
-    Returns
-    -------
-    the number of the sample before each corner, the time of the corner [s], and the slopes before
-    and after it, shape (m,) each
-
-    """
-    slope = np.diff(value) / np.diff(time)
-    k = np.arange(2, slope.size - 2)
-    before, after = slope[k - 1], slope[k + 1]
-    bend = np.abs(after - before)
-    straight = np.maximum(np.abs(before - slope[k - 2]), np.abs(slope[k + 2] - after))
-    width = time[k + 1] - time[k]
-    with np.errstate(divide='ignore', invalid='ignore'):
-        share = (slope[k] - after) / (before - after)
-    # a corner on a sample is known as it is
-    found = ((straight < _STRAIGHT * bend)
-             & (share > _ON_A_SAMPLE) & (share < 1.0 - _ON_A_SAMPLE))
-    return k[found], (time[k] + share * width)[found], before[found], after[found]
+        An interval beside a jump or a corner is straight. Those of a jump itself mean nothing.
+        """
+        k, left, right = self.jumps.interval, self.jumps.left, self.jumps.right
+        slopes = np.tile(self._slope[:, np.newaxis], 2)
+        bend = np.abs(np.r_[0.0, np.diff(self._slope), 0.0])
+        # a bend that stands alone is a corner: the samples two further on know nothing of it
+        padded = np.pad(bend, 2)
+        corner = bend > _CORNER * np.maximum(padded[:-4], padded[4:])
+        smooth = ~(corner[1:] | corner[:-1])
+        # the curve beside a motion that is cut off is no corner
+        smooth[k[left[:, 0] != 0.0] - 1] = True
+        smooth[k[right[:, 0] != 0.0] + 1] = True
+        gradient = np.gradient(self.value, self.time)
+        cut = left.any(axis=1) | right.any(axis=1)
+        gradient[k[cut]], gradient[k[cut] + 1] = left[cut, 0], right[cut, 0]
+        slopes[smooth] = np.stack([gradient[:-1], gradient[1:]], axis=1)[smooth]
+        return slopes
 
 
 def regular_times(after: FloatArray, before: FloatArray,
@@ -224,16 +224,9 @@ def regular_times(after: FloatArray, before: FloatArray,
     Return times that lie in intervals: those of a regular sequence, if there is one in all.
 
     A computer jumps at regular times, which many intervals tell more precisely than each its own.
+    Beside the times, says which of them belong to a regular sequence, shape (n,) each.
 
-    Parameters
-    ----------
-    after, before
-        ends of the intervals, shape (n,) [s]
-
-    Returns
-    -------
-    the times, and which of them belong to a regular sequence, shape (n,) each
-
+    after, before : ends of the intervals, shape (n,) [s]
     """
     found, regular = 0.5 * (after + before), np.zeros(after.size, dtype=bool)
     # the first jump begins the motion, and may belong to no sequence

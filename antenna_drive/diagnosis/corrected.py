@@ -14,11 +14,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from antenna_drive.diagnosis.catalogue import EXTRA_MODE
-from antenna_drive.diagnosis.circuits import value_of
 from antenna_drive.diagnosis.excitation import Bias
 from antenna_drive.diagnosis.modifiers import (
     AntennaParameter, ReadingModifier, RecorderError, RunModifier, RunSetup, SCALE,
 )
+from antenna_drive.diagnosis.sheet_settings import value_of
 from antenna_drive.parameters.loading import load
 from antenna_drive.parameters.records import place_of, record_of
 from antenna_drive.parameters.sets import changed, Drive, values
@@ -37,8 +37,9 @@ _LIKE_THE_POT = tuple(f'{_SHARE}.{name}' for name in ('k_2', 'saturation_low', '
 _OF_A_TEST = (_POT, f'{_SHARE}.fixed_voltage', 'plant.axis.start_elevation',
               'motor_1.start_in_gap', 'motor_2.start_in_gap')
 _AXIS = 'plant.axis.'
-_OF_MODES = ('mode_inertias', 'mode_frequencies', 'mode_damping_ratios', 'pointing_elevation',
-             'pointing_cross_elevation')
+_OF_MODES = tuple(f'{_AXIS}{name}' for name in (
+    'mode_inertias', 'mode_frequencies', 'mode_damping_ratios', 'pointing_elevation',
+    'pointing_cross_elevation'))
 # Where a number stands in a file, by how its dotted name begins.
 _SECTIONS = {f'{_SHARE}.': 'torque_share', 'torque_share.filter_1.': 'filter_1',
              _AXIS: 'axis', 'plant.encoder.': 'encoder'}
@@ -73,8 +74,7 @@ def correct(drive: Drive, records: Sequence[np.ndarray[Any, np.dtype[Any]]],
     """
     given = _as_all_tests_have_it(drive, records)
     point = hypothesis.state.point()
-    owner = {p.name: effect for effect, form in zip(hypothesis.effects, hypothesis.forms,
-                                                    strict=True) for p in form.parameters}
+    owner = {p.name: effect for effect, form in hypothesis.items for p in form.parameters}
     fitted = [(p, point[p.name]) for p in hypothesis.state.parameters
               if isinstance(p, AntennaParameter) and point[p.name] != 0.0]
     written, recorder, missing = _written(given, fitted)
@@ -87,7 +87,7 @@ def correct(drive: Drive, records: Sequence[np.ndarray[Any, np.dtype[Any]]],
                 why[path] = _EFFECT + effect
     reference = {path: value for path, _, value in values(load())}
     lines: dict[str, list[tuple[str, str, Any]]] = {}
-    unwritten = [_told(p.name, owner.get(p.name)) for p in missing]
+    unwritten = [owner.get(p.name) or f'{p.name.partition(":")[0]} of each test' for p in missing]
     for path, entry, old in values(given):
         new = written.get(path, old)
         kept = _allowed(new, entry)
@@ -123,16 +123,14 @@ def _written(drive: Drive, fitted: Sequence[tuple[AntennaParameter, float]],
     missing = []
     for item, value in fitted:
         modifier = item.modifier
-        name = modifier.name if isinstance(modifier, RecorderError) else ''
-        if item.label is not None:
-            missing.append(item)  # a configuration has one number for all tests
-        elif item.experiment is None and isinstance(modifier, RunModifier):
+        # a configuration has one number for all tests
+        of_all = item.label is None and item.experiment is None
+        if of_all and isinstance(modifier, RunModifier):
             modifier.apply(run, value)
-        elif item.experiment is None and isinstance(modifier, ReadingModifier) and modifier.write(
-                run, value):
+        elif of_all and isinstance(modifier, ReadingModifier) and modifier.write(run, value):
             continue
-        elif name:
-            recorder.setdefault((name, item.unit), []).append(value)
+        elif item.label is None and isinstance(modifier, RecorderError):
+            recorder.setdefault((modifier.name, item.unit), []).append(value)
         else:
             missing.append(item)
     run.write_waves()
@@ -156,17 +154,12 @@ def _numbers(drive: Drive, numbers: FloatArray,
     for path, entry, value in values(drive):
         if isinstance(value, tuple):
             count = len(value)
-            if path.startswith(_AXIS) and path.rpartition('.')[2] in _OF_MODES and extra:
+            if extra and path in _OF_MODES:
                 count = max(modes, EXTRA_MODE + 1)
             first = place_of(kind, f'{path}.0')
             yield path, tuple(numbers[first:first + count].tolist())
         elif entry.choices is None and not entry.whole:
             yield path, float(numbers[place_of(kind, path)])
-
-
-def _told(name: str, effect: str | None) -> str:
-    """Return what has no place in a file, for people: an effect, or a kind of numbers."""
-    return effect or f'{name.partition(":")[0]} of each test'
 
 
 def _allowed(value: Any, entry: Entry) -> Any:

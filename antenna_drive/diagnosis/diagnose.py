@@ -23,9 +23,9 @@ from antenna_drive.parameters.sets import Drive
 from antenna_drive.readings import RATE_COMMAND
 from antenna_drive.recording.recording import Recording
 from simgap.errors import UserError
+from simgap.machine import check
 from simgap.machine.by_label import without_labels
-from simgap.machine.check import AT_REST, check_tests, moves
-from simgap.next_test.rivals import Rival
+from simgap.search.rival import Rival
 from simgap.settings import DEFAULT, Settings
 from simgap.verdict.diagnosis import diagnose, Progress
 from simgap.verdict.record import Verdict
@@ -51,21 +51,15 @@ def diagnose_recordings(recordings: Mapping[str, Recording], drive: Drive,
     Raises UserError: a recording cannot be used; the message says which and why.
     """
     machine = AntennaMachine(recordings, drive, threads)
-    check_tests(machine)
+    check.check_tests(machine)
     # the bias builds up for two such times; what moves later, such as in wind, tells something
     built_up = 2.0 * machine.time_scales.start_s
     if not any(recording[RATE_COMMAND].values.any() for recording in recordings.values()) and (
-            not any(moves(test, test.measured, since_s=built_up)
+            not any(check.moves(test, test.measured, since_s=built_up)
                     for test in machine.experiments)):
-        raise UserError(', '.join(recordings) + AT_REST)
-    for effect in without:
-        if effect not in machine.catalogue:
-            raise UserError(f'{effect}: no such effect; docs/diagnosis.md lists the catalogue')
-    for signal in limits or ():
-        if signal not in machine.experiments[0].channels:
-            raise UserError(f'{signal}: no such signal; there are '
-                            + ', '.join(machine.experiments[0].channels))
-    return diagnose(machine.without(without), progress, threads, settings, limits, earlier)
+        raise UserError(', '.join(recordings) + check.AT_REST)
+    return diagnose(check.without(machine, without, limits or ()), progress, threads, settings,
+                    limits, earlier)
 
 
 def corrected(drive: Drive, verdict: Verdict) -> Corrected:

@@ -39,15 +39,7 @@ def _limit(unit: str, description: str) -> float:
 
 @dataclass(frozen=True)
 class DriveLimits:
-    """
-    What a test must not exceed.
-
-    rate_deg_s, acceleration_deg_s2, travel_deg : of the axis
-    current_A : of each motor, article amperes
-    voltage_V : of each armature
-    axis_torque_N_m : of both gearboxes together, at the axis
-    hot_current_A, hot_s : a motor may spend `hot_s` above that current, in all
-    """
+    """What a test must not exceed; a motor may spend `hot_s` in all above `hot_current_A`."""
 
     rate_deg_s: float = _limit('deg/s', 'rate of the axis')
     acceleration_deg_s2: float = _limit('deg/s^2', 'acceleration of the axis')
@@ -71,17 +63,6 @@ class DriveLimits:
             travel_deg=_TRAVEL_DEG, current_A=BEYOND * motor.current_limit,
             voltage_V=BEYOND * armature.voltage_limit, axis_torque_N_m=BEYOND * torque,
             hot_current_A=_HOT * motor.current_limit, hot_s=_HOT_S)
-
-    def changed(self, given: Mapping[str, object]) -> DriveLimits:
-        """
-        Return the limits with some of them given.
-
-        Raises ParameterError: a name or a value is not allowed; the message names the key.
-        """
-        known = {item.name: item for item in fields(self)}
-        return replace(self, **{
-            name: known[name].metadata['entry'].check(name, value)
-            for name, value in mapping_of('', given, known).items()})
 
     def as_data(self) -> dict[str, float]:
         """Return the limits by name."""
@@ -122,8 +103,11 @@ def read_limits(path: Path, drive: Drive) -> DriveLimits:
     both.
     """
     tree = read_yaml(path)
+    known = {item.name: item.metadata['entry'] for item in fields(DriveLimits)}
     try:
-        return DriveLimits.of_drive(drive).changed(mapping_of('', {} if tree is None else tree))
+        given = mapping_of('', {} if tree is None else tree, known)
+        return replace(DriveLimits.of_drive(drive), **{
+            name: known[name].check(name, value) for name, value in given.items()})
     except ParameterError as error:
         raise ParameterError(f'{path}: {error}') from None
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 from antenna_drive.diagnosis.excitation import CommandedRate, SheetCommand
 from antenna_drive.diagnosis.recorded_command import RecordedCommand
-from antenna_drive.diagnosis.samples import spikes
+from antenna_drive.diagnosis.sensors import spikes
 from antenna_drive.readings import AT, NAMED, RATE_COMMAND, RATE_COMMAND_COLUMN, Reading, READINGS
 from antenna_drive.recording import sheet as sheets
 from antenna_drive.recording.recording import Recording
@@ -192,11 +192,10 @@ def _command(name: str, waveform: sheets.Waveform | None, given: Channel,
              note: Note) -> SheetCommand | RecordedCommand:
     if waveform is None:
         note(f'{name}: no waveform in the sheet, the recorded command was interpolated')
-        return RecordedCommand.of(given.time_s, given.values)
-    exact = SheetCommand(waveform)
-    if _is(exact, given):
+    elif _is(exact := SheetCommand(waveform), given):
         return exact
-    note(f"{name}: the recorded command is not the sheet's waveform, it was interpolated")
+    else:
+        note(f"{name}: the recorded command is not the sheet's waveform, it was interpolated")
     return RecordedCommand.of(given.time_s, given.values)
 
 

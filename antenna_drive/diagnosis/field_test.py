@@ -15,10 +15,10 @@ from antenna_drive.diagnosis.excitation import (
 )
 from antenna_drive.diagnosis.field_recording import FieldRecording, Note
 from antenna_drive.diagnosis.inference import completed
-from antenna_drive.diagnosis.late_readings import dense, parts_of
+from antenna_drive.diagnosis.late_readings import dense, Outputs, parts_of, read_at
+from antenna_drive.diagnosis.modifiers import SensorReadings
 from antenna_drive.diagnosis.recorded_command import RecordedCommand
-from antenna_drive.diagnosis.samples import slips
-from antenna_drive.diagnosis.sensors import jitter_of, SensorModel
+from antenna_drive.diagnosis.sensors import jitter_of, SensorModel, slips
 from antenna_drive.diagnosis.sheet_settings import as_the_sheet_says
 from antenna_drive.diagnosis.suitability import check
 from antenna_drive.diagnosis.windows import Window, windows
@@ -86,11 +86,6 @@ class FieldTest:
     labels: Mapping[str, str] = field(default_factory=dict)
     excerpt: Excerpt | None = None
 
-    @property
-    def tolerances(self) -> sheets.Tolerances:
-        """Return the tolerances of zeros, recorders and clocks."""
-        return self.sheet.tolerances or sheets.Tolerances()
-
     @cached_property
     def output_times(self) -> FloatArray:
         """Return the times at which a run keeps its outputs: the samples and some between [s]."""
@@ -111,6 +106,36 @@ class FieldTest:
         """Return the readings of the drive as configured, with steps of at most this [s]."""
         plan = schedule(self.command, self.bias, self.time, Longest(longest_step))
         return np.asarray(batch.run(self.record, plan)[:, :, 0])
+
+    def readings_of(self, out: Outputs, errors: SensorReadings,
+                    digits: FloatArray | None) -> FloatArray:
+        """
+        Return the readings of a run, shape (n, c).
+
+        out : of the run, all readings
+        errors : of the sensors, which nothing feeds back
+        digits : readings of the encoder in digits, shape (n,); None if they tell none
+        """
+        wanted = self.time + errors.clock_rate * (self.time - self.time[0])
+        values = read_at(self.output_times, out.values, wanted, errors.late)
+        for name, tachometer in out.rippling.items():
+            c = AT[name]
+            values[:, c] = tachometer.read_at(self.output_times, out.values[:, c], wanted,
+                                              float(errors.late[c]))
+        values *= errors.gain
+        angle = values[:, AT['encoder']]
+        for shape, parts in errors.waves.items():
+            angle += shape.along(angle + self.start_angle, parts)
+        values += errors.zero
+        digit = errors.digit
+        if digit > 0.0 and digits is not None:
+            # whatever lies within the digit that was read would have been read
+            shift = errors.turn * digit
+            off = np.nan_to_num(angle - (digits + shift))
+            angle -= np.clip(off, -0.5 * digit, 0.5 * digit) + shift
+        elif digit > 0.0:
+            angle[:] = digit * np.floor(angle / digit + 0.5)
+        return values
 
     @property
     def repeats(self) -> bool:
@@ -160,15 +185,16 @@ def window_of(recording: FieldRecording, window: Window, drive: Drive, bias: Bia
     if isinstance(command, RecordedCommand):
         for begin, end in command.holes + window.begin:
             measured[(time > begin) & (time < end + _FORGOTTEN_S)] = np.nan
-    rest = time < recording.onset
+    resting = measured[time < recording.onset]
     for tachometer in of(TACHOMETER):
-        c = AT[tachometer.name]
-        measured[rest, c] = np.where(slips(
-            measured[rest, c], sensors.errors(tachometer).scatter), np.nan, measured[rest, c])
+        rates = resting[:, AT[tachometer.name]]
+        rates[slips(rates, sensors.errors(tachometer).scatter)] = np.nan
+    measured[time < recording.onset] = resting
+    angle = 0.0
     if window.begin > 0.0:
         drive = changed(drive, {'torque_share.circuit.start': 'steady'})
-    angle = 0.0 if window.known_start else _angle(recording, window.begin)
     if not window.known_start:
+        angle = _angle(recording, window.begin)
         measured[:, AT['encoder']] -= angle
         drive = changed(drive, {
             'plant.axis.start_elevation': drive.plant.axis.start_elevation + angle})

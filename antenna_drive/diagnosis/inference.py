@@ -11,9 +11,10 @@ is never overruled. A note says what was inferred, and by how much the next best
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
 
 from antenna_drive.diagnosis.bias_inference import (
-    CIRCUITS, CLEAR, CURRENTS, DOUBT, of_table, with_circuit, with_entries, with_sources,
+    CURRENTS, of_table, told, with_circuit, with_entries, with_sources,
 )
 from antenna_drive.diagnosis.excitation import Longest, schedule
 from antenna_drive.diagnosis.field_recording import FieldRecording, Note
@@ -41,22 +42,15 @@ def completed(recordings: Sequence[FieldRecording], drive: Drive,
     drive : the configuration, which holds for what cannot be inferred
     note : called with what was inferred, what is as configured, and what contradicts a sheet
     """
-    if any(recording.is_planned for recording in recordings):
-        for recording in recordings:
-            _note_silence(recording, note)
-        return list(recordings)
-    found = with_sources(list(recordings), drive, note)
-    found = with_circuit(found, drive, note)
-    found = _with_filter_1(found, drive, note)
+    found = list(recordings)
+    if not any(recording.is_planned for recording in recordings):
+        for infer in (with_sources, with_circuit, _with_filter_1):
+            found = infer(found, drive, note)
     for recording in found:
-        _note_silence(recording, note)
+        for entry in ('circuit', 'filter_1', 'bias'):
+            if getattr(recording.sheet, entry) is None:
+                note(f'{recording.name}: the sheet does not give {entry}: as configured')
     return found
-
-
-def _note_silence(recording: FieldRecording, note: Note) -> None:
-    for entry in ('circuit', 'filter_1', 'bias'):
-        if getattr(recording.sheet, entry) is None:
-            note(f'{recording.name}: the sheet does not give {entry}: as configured')
 
 
 def _with_filter_1(recordings: list[FieldRecording], drive: Drive,
@@ -67,36 +61,22 @@ def _with_filter_1(recordings: list[FieldRecording], drive: Drive,
     if not compared:
         return recordings
 
-    def misfit(**entries: str) -> float:
-        return _NOISE_A + float(np.mean([
-            _misfit_of_currents(with_entries(recording, **entries), drive)
+    @cache
+    def misfit(name: str | None) -> float:
+        return _NOISE_A + float(np.mean([_misfit_of_currents(
+            with_entries(recording, filter_1=name or recording.sheet.filter_1), drive)
             for recording in compared]))
 
-    misfits = {name: misfit(filter_1=name) for name in CIRCUITS}
-    best, other = sorted(CIRCUITS, key=lambda name: misfits[name])
-    worse = misfits[other] / misfits[best]
-    given = {recording.sheet.filter_1 for recording in recordings} - {None}
-    if not given and not of_table('filter_1', drive) and misfit() <= CLEAR * misfits[best]:
-        note('filter_1: the configured constants fit as well: as configured')
+    circuits = {recording.sheet.circuit for recording in recordings} - {None}
+    named = told('filter_1', misfit, {recording.sheet.filter_1 for recording in recordings} - {
+        None}, drive, note, 'the currents look', 'as the circuit' if circuits else 'as configured')
+    if named == '' and circuits:
+        named = circuits.pop()
+    if not named:
         return recordings
-    if given:
-        if given == {other} and worse > DOUBT:
-            note(f'the sheets give filter_1 {other}, the currents look like {best} ({other} fits '
-                 f'{worse:.1f} times worse); the sheets are believed')
-        best = str(given.pop())
-    elif worse < CLEAR:
-        known = {recording.sheet.circuit for recording in recordings} - {None}
-        note(f'filter_1: {other} fits {worse:.2f} times worse than {best}, which tells nothing; '
-             f"{'as the circuit' if known else 'as configured'}, unless a sheet says "
-             f"'filter_1: {best}' or 'filter_1: {other}'")
-        if not known:
-            return recordings
-        best = str(known.pop())
-    else:
-        note(f'filter_1 {best}: inferred, {other} fits {worse:.1f} times worse')
     # both are of Table 1, and were changed together
-    circuit = best if of_table('circuit', drive) else None
-    return [with_entries(recording, filter_1=recording.sheet.filter_1 or best,
+    circuit = named if of_table('circuit', drive) else None
+    return [with_entries(recording, filter_1=recording.sheet.filter_1 or named,
                          circuit=recording.sheet.circuit or circuit) for recording in recordings]
 
 

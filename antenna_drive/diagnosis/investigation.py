@@ -19,8 +19,7 @@ from antenna_drive.recording.recording import Recording
 from antenna_drive.recording.sheet import dump_sheet, TestSheet
 import numpy as np
 from simgap.next_test.investigation import Bench, InvestigationPlan
-from simgap.next_test.rivals import Rival
-from simgap.settings import DEFAULT, Settings
+from simgap.search.rival import Rival
 from simgap.verdict.diagnosis import Progress
 from simgap.verdict.record import Verdict
 
@@ -43,19 +42,18 @@ class DriveBench(Bench):
     sensors : whose errors are added to the recordings, for a drive that has none; None for a real
         one
     threads : simulations at once
-    settings : thresholds
     """
 
     played = 'test_{number}.yaml'
 
     def __init__(self, drive: Drive, limits: DriveLimits, base: TestSheet, play: RunTest,
-                 plan: InvestigationPlan, sensors: SensorModel | None = None, threads: int = 2,
-                 settings: Settings = DEFAULT) -> None:
+                 plan: InvestigationPlan, sensors: SensorModel | None = None,
+                 threads: int = 2) -> None:
         """Keep what the drive is."""
         self.space = AntennaTests(base, drive, limits, plan.duration)
         self.limits = limits.as_data()
         self._drive, self._base, self._play, self._seed = drive, base, play, plan.seed
-        self._sensors, self._threads, self._settings = sensors, threads, settings
+        self._sensors, self._threads = sensors, threads
 
     def save(self, test: TestSheet, path: Path) -> None:
         """Write the sheet, with what is known of the sensors."""
@@ -74,8 +72,7 @@ class DriveBench(Bench):
             found[name] = read_recording(path)
             if self._sensors is not None:
                 found[name] = sensed(found[name], self._sensors, [self._seed, k])
-        return diagnose_recordings(found, self._drive, progress, self._threads, self._settings,
-                                   earlier=earlier)
+        return diagnose_recordings(found, self._drive, progress, self._threads, earlier=earlier)
 
 
 def sensed(recording: Recording, sensors: SensorModel, seed: Sequence[int]) -> Recording:

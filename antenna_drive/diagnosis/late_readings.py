@@ -10,6 +10,7 @@ slopes. To first order alone, a delay of 7 ms at 5 Hz is off by 2 percent of the
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 import math
 from typing import Any
@@ -40,23 +41,14 @@ def dense(time: FloatArray, parts: int) -> FloatArray:
 def read_at(time: FloatArray, out: FloatArray, wanted: FloatArray, late: FloatArray,
             ) -> FloatArray:
     """
-    Return readings at other times.
+    Return readings at other times, shape (m, c).
 
-    Parameters
-    ----------
-    time
-        of the outputs, increasing, shape (n,) [s]
-    out
-        values and slopes of every channel, shape (n, c, 2)
-    wanted
-        times, shape (m,) [s]
-    late
-        by how much earlier each channel is read, shape (c,) [s]
+    Before the first output the machine stands still, after the last it goes on.
 
-    Returns
-    -------
-    shape (m, c); before the first output the machine stands still, after the last it goes on
-
+    time : of the outputs, increasing, shape (n,) [s]
+    out : values and slopes of every channel, shape (n, c, 2)
+    wanted : times, shape (m,) [s]
+    late : by how much earlier each channel is read, shape (c,) [s]
     """
     found = np.empty((wanted.size, late.size))
     _read_at(time, out, wanted, late, found)
@@ -90,6 +82,19 @@ class RipplingTachometer:
         found = np.empty(wanted.size)
         _readings(later, self.numbers, found)
         return found
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """
+    What a run gives at the output times.
+
+    values : and slopes of n channels, shape (times, n, 2)
+    rippling : tachometers with a ripple, by the names of their readings
+    """
+
+    values: FloatArray
+    rippling: Mapping[str, RipplingTachometer]
 
 
 @compiled

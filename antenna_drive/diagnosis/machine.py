@@ -9,23 +9,23 @@ from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 import copy
 from dataclasses import dataclass, replace
+from functools import cached_property
 import math
 from threading import Lock
 from typing import Any
 
 from antenna_drive.diagnosis.advice import ADVICE
 from antenna_drive.diagnosis.antenna_catalogue import AntennaCatalogue
-from antenna_drive.diagnosis.antenna_nuisances import AntennaNuisances, tolerated
 from antenna_drive.diagnosis.catalogue import catalogue, EXTRA_MODE
 from antenna_drive.diagnosis.diagram import DIAGRAM
 from antenna_drive.diagnosis.disturbances import DISTURBANCES, DriveDisturbance
 from antenna_drive.diagnosis.excitation import Longest
-from antenna_drive.diagnosis.field_test import prepared
-from antenna_drive.diagnosis.late_readings import RipplingTachometer
+from antenna_drive.diagnosis.field_test import FieldTest, prepared
+from antenna_drive.diagnosis.late_readings import Outputs, RipplingTachometer
 from antenna_drive.diagnosis.modifiers import KnownModifiers, RunSetup, SensorReadings
-from antenna_drive.diagnosis.outputs import coarser_digit, Outputs, readings_of
 from antenna_drive.diagnosis.plans import disturbed, Plans
-from antenna_drive.diagnosis.tolerances import nuisances
+from antenna_drive.diagnosis.sensors import digit_of
+from antenna_drive.diagnosis.tolerances import AntennaNuisances, nuisances, tolerated
 from antenna_drive.diagnosis.waves import fastest_wave, is_there
 from antenna_drive.diagnosis.words import words
 from antenna_drive.emulator import batch
@@ -50,6 +50,10 @@ WAVE_STEP = 0.9
 SHORTEST_STEP = 7e-4
 # Hysteresis settles too fast for long steps.
 _STIFF = ('hysteresis', 'hysteresis_share')
+# An encoder's digit differs from the sheet's if it is larger by this factor.
+_COARSER = 1.3
+# Of the parameters, where no sheet gives it.
+_TOLERANCE = 0.02
 # Runs that are kept.
 _KEPT_RUNS = 24
 
@@ -62,6 +66,14 @@ class _Job:
     items: tuple[tuple[str, float], ...]
     until: float
 
+    def __hash__(self) -> int:
+        return self._hash
+
+    @cached_property
+    def _hash(self) -> int:
+        # of hundreds of numbers, and asked for many times
+        return hash((self.experiment, self.items, self.until))
+
 
 class AntennaMachine(Machine):
     """
@@ -70,7 +82,6 @@ class AntennaMachine(Machine):
     recordings : of one machine, by name
     drive : the configuration
     threads : how many runs at once
-    tolerance : of the parameters, where no sheet gives it
 
     Raises UserError: a recording lacks its rate command or has no reading to compare.
     """
@@ -81,17 +92,18 @@ class AntennaMachine(Machine):
     diagram = DIAGRAM
     advice = ADVICE
 
-    def __init__(self, recordings: Mapping[str, Recording], drive: Drive, threads: int = 2,
-                 tolerance: float = 0.02) -> None:
+    def __init__(self, recordings: Mapping[str, Recording], drive: Drive,
+                 threads: int = 2) -> None:
         """Prepare the tests and take the sensors' noise from a first run."""
-        self._executor = ThreadPoolExecutor(threads)
+        # one thread needs no other, and no time to hand over to it
+        self._map = ThreadPoolExecutor(threads).map if threads > 1 else map
         self._runs: OrderedDict[_Job, Outputs] = OrderedDict()
-        self._plans = Plans()
         self._lock = Lock()
         self._longest_step = LONGEST_STEP
         self._low_fidelity: AntennaMachine | None = None
         notes: list[str] = []
         self._tests = prepared(recordings, drive, notes.append)
+        self._plans = Plans(self._tests)
         for test in self._tests:
             frequencies = test.record['plant']['axis']['mode_frequencies']
             if frequencies[0, EXTRA_MODE] == 0.0:
@@ -99,11 +111,10 @@ class AntennaMachine(Machine):
         given = [recording.sheet.parameter_tolerance for recording in recordings.values()
                  if recording.sheet.parameter_tolerance is not None]
         if not given:
-            notes.append(f'no sheet gives parameter_tolerance: {tolerance:g} assumed')
+            notes.append(f'no sheet gives parameter_tolerance: {_TOLERANCE:g} assumed')
         self.notes = notes
-        self.tolerance = max(given, default=tolerance)
-        self._digit = coarser_digit(self._tests)
-        tolerances = nuisances(self._tests, self.tolerance)
+        self._digit = _coarser_digit(self._tests)
+        tolerances = nuisances(self._tests, max(given, default=_TOLERANCE))
         effects = catalogue([float(test.time[-1]) for test in self._tests], self._digit)
         self.words = words(effects.values(), drive, self._tests[0].record)
         modifiers = KnownModifiers()
@@ -144,13 +155,12 @@ class AntennaMachine(Machine):
 
     def truncated(self) -> AntennaMachine:
         """Return the machine with the first part of each test; a chirp stays whole."""
-        other = self._with_long_steps()
-        other._tests = [test.until(TRUNCATED_S if test.repeats else math.inf)
-                        for test in self._tests]
-        sizes = [test.time.size for test in other._tests]
+        other = self._with_long_steps([
+            test.until(TRUNCATED_S if test.repeats else math.inf) for test in self._tests])
         other.experiments = tuple(
             replace(e, time=e.time[:n], measured=e.measured[:n], noise=e.noise[:n])
-            for n, e in zip(sizes, self.experiments, strict=True))
+            for n, e in zip([test.time.size for test in other._tests], self.experiments,
+                            strict=True))
         return other
 
     def low_fidelity(self) -> AntennaMachine:
@@ -158,13 +168,12 @@ class AntennaMachine(Machine):
         if self._longest_step >= LOW_FIDELITY_STEP:
             return self
         if self._low_fidelity is None:
-            self._low_fidelity = self._with_long_steps()
+            self._low_fidelity = self._with_long_steps(self._tests)
         return self._low_fidelity
 
-    def _with_long_steps(self) -> AntennaMachine:
+    def _with_long_steps(self, tests: list[FieldTest]) -> AntennaMachine:
         other = copy.copy(self)
-        other._runs = OrderedDict()
-        other._plans = Plans()
+        other._tests, other._plans, other._runs = tests, Plans(tests), OrderedDict()
         other._longest_step = LOW_FIDELITY_STEP
         return other
 
@@ -211,7 +220,7 @@ class AntennaMachine(Machine):
                 results[i][job.experiment] = self._read(job.experiment, out, points[i])
             return out if known is None else None
 
-        for job, fresh in zip(uses, self._executor.map(read, uses), strict=True):
+        for job, fresh in zip(uses, self._map(read, uses), strict=True):
             if fresh is not None:
                 with self._lock:
                     self._runs[job] = fresh
@@ -227,12 +236,12 @@ class AntennaMachine(Machine):
         def run(k: int) -> FloatArray:
             return self._read(k, self._run(self._job(k, point, math.inf), (place, course)), point)
 
-        return list(self._executor.map(run, range(len(self._tests))))
+        return list(self._map(run, range(len(self._tests))))
 
     def _job(self, k: int, point: Point, until: float) -> _Job:
         """Return the run of one test at a point: what acts on readings alone is not part of it."""
         return _Job(k, tuple(item for item in sorted(point.items())
-                             if item[0] not in self._reading_modifiers
+                             if item[0] in self._run_modifiers
                              and self._run_modifiers[item[0]][1] in (None, k)), until)
 
     def outputs(self, point: Point, experiment: int,
@@ -240,19 +249,9 @@ class AntennaMachine(Machine):
         """
         Return outputs of the drive in one experiment that no sensor reads.
 
-        Parameters
-        ----------
-        point
-            parameter values by name
-        experiment
-            its index
-        channels
-            names of c outputs, 'unit/signal'
+        channels : names of c outputs, 'unit/signal'
 
-        Returns
-        -------
-        times, shape (n,) [s], and values and slopes, shape (n, c, 2)
-
+        Returns times, shape (n,) [s], and values and slopes, shape (n, c, 2).
         """
         job = self._job(experiment, point, math.inf)
         return self._tests[experiment].output_times, self._run(job, channels=channels).values
@@ -277,8 +276,8 @@ class AntennaMachine(Machine):
         stiff = any(record[motor]['gearbox'][name][0] > 0.0
                     for motor in ('motor_1', 'motor_2') for name in _STIFF)
         longest = min(self._longest_step, LONGEST_STEP) if stiff else self._longest_step
-        plan = self._plans.steps(job.experiment, test, run,
-                                 Longest(longest, SHORTEST_STEP, WAVE_STEP, cycles))
+        plan = self._plans.steps(job.experiment, run, Longest(
+            longest, SHORTEST_STEP, WAVE_STEP, cycles))
         if disturbance is not None:
             plan = disturbed(plan, run, *disturbance)
         rippling = {f'tach_{m}': f'motor_{m}' for m in (1, 2)
@@ -306,7 +305,14 @@ class AntennaMachine(Machine):
             if modifier is not None and test in (None, k) and value:
                 modifier.apply_to_readings(errors, value)
         digits = self.experiments[k].measured[:, AT['encoder']] if self._digit else None
-        return readings_of(self._tests[k], out, errors, digits)
+        return self._tests[k].readings_of(out, errors, digits)
+
+
+def _coarser_digit(tests: Sequence[FieldTest]) -> float:
+    """Return the encoder's digit if it is coarser than its sheet says, else 0 [rad]."""
+    digit = min(digit_of(test.measured[:, AT['encoder']]) for test in tests)
+    known = max(test.sensors.errors(NAMED['encoder']).digit for test in tests)
+    return digit if digit > _COARSER * known else 0.0
 
 
 def _in_common(sheets: Iterable[TestSheet]) -> TestSheet:

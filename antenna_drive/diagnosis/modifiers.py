@@ -9,19 +9,64 @@ Each entry of the catalogue, and each tolerance, declares its modifier where it 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from functools import cache
+import math
 from typing import Any
 
 from antenna_drive.diagnosis.excitation import Bias
-from antenna_drive.diagnosis.wave_shape import WaveShape
 from antenna_drive.parameters.records import place_of
 from antenna_drive.readings import AT, READINGS
 import numpy as np
 from simgap.machine.contract import FloatArray, Parameter
 
 SCALE, ADD, SET = 'scale', 'add', 'set'
+
+
+@dataclass(frozen=True)
+class WaveShape:
+    """
+    Where a wave is and which angle it follows.
+
+    stem : what the names of the amplitude, cycles and phases in the record begin with
+    paths : where these fields are
+    angle : 'motor_1', 'motor_2' or 'axis'
+    order : cycles per revolution; 0 if not chosen yet
+    """
+
+    stem: str
+    paths: tuple[str, ...]
+    angle: str
+    order: float = 0.0
+
+    def fields(self, parts: Sequence[float], turned: float = 0.0) -> dict[str, float]:
+        """
+        Return the wave as the record has it: amplitudes and phases, by the ends of their names.
+
+        parts : sine and cosine, relative change of the order, sine and cosine of the second and of
+            the third harmonic
+        turned : angle from which the angle of the record counts [rad]
+        """
+        sine, cosine, change, second_sine, second_cosine, third_sine, third_cosine = parts
+        cycles = self.order * (1.0 + change)
+        phase = math.remainder(cycles * turned, math.tau)
+        return {'': math.hypot(sine, cosine),
+                '_phase': math.atan2(cosine, sine) + phase,
+                '_cycles': cycles,
+                '_second': math.hypot(second_sine, second_cosine),
+                '_second_phase': math.atan2(second_cosine, second_sine) + 2.0 * phase,
+                '_third': math.hypot(third_sine, third_cosine),
+                '_third_phase': math.atan2(third_cosine, third_sine) + 3.0 * phase}
+
+    def along(self, angle: FloatArray, parts: Sequence[float]) -> FloatArray:
+        """Return the wave at angles of shape (n,); `parts` as in `fields`."""
+        sine, cosine, change, *higher = parts
+        total = np.zeros_like(angle)
+        amplitudes = (sine, cosine, *higher)
+        for k, (a, b) in enumerate(zip(amplitudes[::2], amplitudes[1::2], strict=True), start=1):
+            turned = k * self.order * (1.0 + change) * angle
+            total += a * np.sin(turned) + b * np.cos(turned)
+        return total
 
 
 @dataclass
@@ -52,7 +97,13 @@ class RunSetup:
 
     def change(self, path: str, how: str, value: float) -> None:
         """Scale a number of the record by 1 + value, add the value to it, or set it."""
-        change(self.numbers, place_of(self.kind, path), how, value)
+        place = place_of(self.kind, path)
+        if how == SCALE:
+            self.numbers[place] *= 1.0 + value
+        elif how == ADD:
+            self.numbers[place] += value
+        else:
+            self.numbers[place] = value
 
     @property
     def delay(self) -> float:
@@ -141,23 +192,8 @@ class FieldChange(RunModifier):
     fields: tuple[str, ...]
 
     def apply(self, run: RunSetup, value: float) -> None:
-        for place in _places(run.kind, self.fields):
-            change(run.numbers, place, self.how, value)
-
-
-@cache
-def _places(kind: np.dtype[Any], fields: tuple[str, ...]) -> tuple[int, ...]:
-    return tuple(place_of(kind, path) for path in fields)
-
-
-def change(numbers: FloatArray, place: int, how: str, value: float) -> None:
-    """Change one number of a record."""
-    if how == SCALE:
-        numbers[place] *= 1.0 + value
-    elif how == ADD:
-        numbers[place] += value
-    else:
-        numbers[place] = value
+        for path in self.fields:
+            run.change(path, self.how, value)
 
 
 @dataclass(frozen=True)

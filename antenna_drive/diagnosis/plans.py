@@ -4,16 +4,15 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict
-from collections.abc import Callable
-from threading import Lock
+from collections.abc import Sequence
+from functools import lru_cache
 from typing import TypeAlias
 
 from antenna_drive.diagnosis import gust
 from antenna_drive.diagnosis.disturbances import DriveDisturbance
 from antenna_drive.diagnosis.excitation import Bias, Longest, schedule, with_bias, with_torque
 from antenna_drive.diagnosis.field_test import FieldTest
-from antenna_drive.diagnosis.modifiers import change, RunSetup
+from antenna_drive.diagnosis.modifiers import RunSetup
 from antenna_drive.diagnosis.recorded_command import RecordedCommand
 from antenna_drive.emulator import batch
 from antenna_drive.parameters.records import place_of
@@ -24,51 +23,41 @@ from simgap.machine.contract import Course
 _KEPT_PLANS = 24
 # By number: late jumps of the command [s], or other means in its holes [rad/s].
 _Numbered: TypeAlias = tuple[tuple[int, float], ...]
-# Test, longest step, delay of the command [s], what it did unrecorded, source of the bias.
-_PlanKey: TypeAlias = tuple[int, Longest, float, tuple[_Numbered, _Numbered], Bias]
 
 
 class Plans:
-    """The tables of steps of the last runs."""
+    """The tables of steps of the last runs of some tests."""
 
-    def __init__(self) -> None:
-        self._plans: OrderedDict[_PlanKey, batch.Schedule] = OrderedDict()
-        self._lock = Lock()
+    def __init__(self, tests: Sequence[FieldTest]) -> None:
+        self._tests = tests
+        self._kept = lru_cache(_KEPT_PLANS)(self._made)
 
-    def steps(self, k: int, test: FieldTest, run: RunSetup, longest: Longest) -> batch.Schedule:
+    def steps(self, k: int, run: RunSetup, longest: Longest) -> batch.Schedule:
         """Return the steps of a run of test k, none of which is longer than allowed."""
-        unrecorded = (tuple(run.late_jumps.items()), tuple(run.hole_means.items()))
-
-        def planned() -> batch.Schedule:
-            command = test.command
-            if isinstance(command, RecordedCommand):
-                for number, later in run.late_jumps.items():
-                    command = command.with_jump(number, later)
-                for number, more in run.hole_means.items():
-                    command = command.with_mean(number, more)
-            return schedule(command, test.bias, test.output_times, longest, run.delay)
-
-        key = (k, longest, run.delay, unrecorded)
-        plan = self._kept((*key, run.bias), lambda: with_bias(
-            self._kept((*key, test.bias), planned), run.bias))
+        plan = self._kept(k, longest, run.delay, tuple(run.late_jumps.items()),
+                          tuple(run.hole_means.items()), run.bias)
         return plan if run.gust is None else with_torque(plan, *gust.course(run.gust))
 
-    def _kept(self, key: _PlanKey, made: Callable[[], batch.Schedule]) -> batch.Schedule:
-        """Return the table of steps of a test, made if it is not known."""
-        plan = self._plans.get(key) or made()
-        with self._lock:
-            self._plans[key] = plan
-            self._plans.move_to_end(key)
-            while len(self._plans) > _KEPT_PLANS:
-                self._plans.popitem(last=False)
-        return plan
+    def _made(self, k: int, longest: Longest, delay: float, late_jumps: _Numbered,
+              hole_means: _Numbered, bias: Bias) -> batch.Schedule:
+        test = self._tests[k]
+        if bias != test.bias:
+            return with_bias(
+                self._kept(k, longest, delay, late_jumps, hole_means, test.bias), bias)
+        command = test.command
+        if isinstance(command, RecordedCommand):
+            for number, later in late_jumps:
+                command = command.with_jump(number, later)
+            for number, more in hole_means:
+                command = command.with_mean(number, more)
+        return schedule(command, bias, test.output_times, longest, delay)
 
 
 def disturbed(plan: batch.Schedule, run: RunSetup, place: DriveDisturbance,
               course: Course) -> batch.Schedule:
     """Return a plan that lets an input into the drive, and set the drive's record up for it."""
     for path, how, value in place.settings:
-        change(run.numbers, place_of(run.kind, path), how, value)
+        run.change(path, how, value)
     steps = plan.steps.copy()
     length = steps[:, batch.LENGTH]
     steps[:, batch.CHANGE] = place.size * course(np.cumsum(length) - 0.5 * length)

@@ -10,9 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from antenna_drive.diagnosis.command_samples import (
-    corners_of, holes_of, jumps_of, slopes_of, uncertainty_of,
-)
+from antenna_drive.diagnosis.command_samples import CommandSamples
 import numpy as np
 from simgap.machine.contract import FloatArray
 
@@ -46,9 +44,8 @@ class RecordedCommand:
     @classmethod
     def of(cls, time: FloatArray, value: FloatArray) -> RecordedCommand:
         """Take the samples of a command, shape (n,) [s], [rad/s]."""
-        uncertainty = uncertainty_of(time, value)
-        found = jumps_of(time, value, uncertainty)
-        holes = holes_of(time, value, uncertainty, found)
+        samples = CommandSamples(time, value)
+        found, holes = samples.jumps, samples.holes
         k, jumps = found.interval, found.time
         slack = np.column_stack([np.minimum(time[k] - jumps + _APART_S, 0.0),
                                  np.maximum(time[k + 1] - jumps - _APART_S, 0.0)])
@@ -59,24 +56,26 @@ class RecordedCommand:
         values = np.r_[value, value[k] + rise_left, value[k + 1] + rise_right]
         order = np.argsort(times, kind='stable')
         # three pieces in the place of an interval with a jump: the middle one is the jump
-        slope = np.insert(slopes_of(time, value, found), np.repeat(k, 2), 0.0, axis=0)
+        slope = np.insert(samples.slopes, np.repeat(k, 2), 0.0, axis=0)
         first = k + 2 * np.arange(k.size)
         slope[first] = np.column_stack([found.left[:, 0], slope_left])
         slope[first + 2] = np.column_stack([slope_right, found.right[:, 0]])
         return cls(times[order], values[order], slope, jumps, slack,
                    np.column_stack([time[holes], time[holes + 1]]),
-                   uncertainty[holes])._with_corners(time, value)
+                   samples.uncertainty[holes])._with_corners(samples)
 
-    def _with_corners(self, time: FloatArray, value: FloatArray) -> RecordedCommand:
+    def _with_corners(self, samples: CommandSamples) -> RecordedCommand:
         """Return the command with a corner wherever straight lines meet between two samples."""
-        k, at, before, after = corners_of(time, value)
-        piece = np.searchsorted(self.time, time[k], side='right') - 1
+        corners = samples.corners
+        begin, value = samples.time[corners.sample], samples.value[corners.sample]
+        piece = np.searchsorted(self.time, begin, side='right') - 1
         slope = self.slope.copy()
-        slope[piece] = before[:, np.newaxis]
+        slope[piece] = corners.before[:, np.newaxis]
         return replace(
-            self, time=np.insert(self.time, piece + 1, at),
-            value=np.insert(self.value, piece + 1, value[k] + before * (at - time[k])),
-            slope=np.insert(slope, piece + 1, np.stack([after, after], axis=1), axis=0))
+            self, time=np.insert(self.time, piece + 1, corners.time),
+            value=np.insert(self.value, piece + 1,
+                            value + corners.before * (corners.time - begin)),
+            slope=np.insert(slope, piece + 1, np.tile(corners.after[:, np.newaxis], 2), axis=0))
 
     def __call__(self, time: FloatArray) -> FloatArray:
         """Return the rate command [rad/s] at these times [s]."""

@@ -1,43 +1,71 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a test sheet sets in the drive."""
+"""What a test sheet sets in the drive: the circuits of Table 1, the elevation, the bias."""
 
 from __future__ import annotations
 
+from functools import cache, reduce
 import math
 from typing import Any
 
-from antenna_drive.diagnosis.circuits import CIRCUITS, constants, nearest_circuit
 from antenna_drive.diagnosis.excitation import Bias
+from antenna_drive.parameters.loading import load
 from antenna_drive.parameters.sets import changed, Drive
 from antenna_drive.recording import sheet as sheets
 
-# The parameters that a sheet's name of a circuit sets.
+CIRCUITS = ('new', 'old')
+# The numbers that a test sheet's name of a circuit stands for.
+_NUMBERS = {'circuit': ('torque_share.circuit', ('k_2', 's_2', 'k_3', 'g_4')),
+            'filter_1': ('torque_share.filter_1', ('gain', 'pole'))}
+
+
+@cache
+def constants(entry: str, name: str) -> dict[str, float]:
+    """Return the numbers that 'circuit' or 'filter_1' of a sheet stands for, by dotted name."""
+    return _numbers(load(f'{name}_circuit'), entry)
+
+
+def nearest_circuit(drive: Drive, entry: str) -> str:
+    """Return the named circuit whose numbers are nearest to those of a drive."""
+    here = _numbers(drive, entry)
+
+    def distance(name: str) -> float:
+        there = constants(entry, name)
+        ratios = [here[path] / there[path] for path in here]
+        return sum(abs(math.log(ratio)) if ratio > 0.0 else math.inf for ratio in ratios)
+
+    return min(CIRCUITS, key=distance)
+
+
+def _numbers(drive: Drive, entry: str) -> dict[str, float]:
+    part, keys = _NUMBERS[entry]
+    return {path: float(value_of(drive, path)) for path in (f'{part}.{key}' for key in keys)}
+
+
+def value_of(drive: Drive, path: str) -> Any:
+    """Return what a configuration says of a dotted name."""
+    return reduce(getattr, path.split('.'), drive)
 
 
 def as_the_sheet_says(sheet: sheets.TestSheet, drive: Drive) -> tuple[Drive, Bias]:
     """Return the drive and the source of bias of a test; as configured where a sheet is silent."""
-    for word in CIRCUITS:
-        circuit = getattr(sheet, word)
+    changes: dict[str, Any] = {}
+    for entry in _NUMBERS:
+        circuit = getattr(sheet, entry)
         # a corrected configuration has numbers of its own near those of the circuit
-        if circuit is not None and nearest_circuit(drive, word) != circuit:
-            drive = changed(drive, constants(word, circuit))
+        if circuit is not None and nearest_circuit(drive, entry) != circuit:
+            changes |= constants(entry, circuit)
     if sheet.elevation_deg is not None:
-        drive = changed(drive, {'plant.axis.start_elevation': math.radians(sheet.elevation_deg)})
-    share = 'torque_share.circuit.'
-    given = sheet.bias
+        changes['plant.axis.start_elevation'] = math.radians(sheet.elevation_deg)
+    share, given = 'torque_share.circuit', sheet.bias
     if isinstance(given, sheets.CircuitBias):
-        changes: dict[str, Any] = {f'{share}bias_source': 'circuit'}
-        if given.bias_pot is not None:
-            changes[f'{share}bias_pot'] = given.bias_pot
-        if given.start is not None:
-            changes[f'{share}start'] = given.start
+        said = {'bias_source': 'circuit', 'bias_pot': given.bias_pot, 'start': given.start}
+        changes |= {f'{share}.{name}': value for name, value in said.items() if value is not None}
         return changed(drive, changes), Bias()
     if given is None:
         voltage = drive.torque_share.circuit.fixed_voltage
-        return drive, Bias(voltage, voltage)
+        return changed(drive, changes), Bias(voltage, voltage)
     voltage = given.voltage_V or 0.0
-    drive = changed(drive, {f'{share}bias_source': 'fixed'})
-    if isinstance(given, sheets.FixedStepBias):
-        return drive, Bias(0.0, voltage, given.at_s or 0.0)
-    return drive, Bias(voltage, voltage)
+    source = (Bias(0.0, voltage, given.at_s or 0.0) if isinstance(given, sheets.FixedStepBias)
+              else Bias(voltage, voltage))
+    return changed(drive, {**changes, f'{share}.bias_source': 'fixed'}), source

@@ -1,20 +1,29 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""The nuisances: tolerances of the machine, its initial conditions, zeros of the sensors."""
+"""
+The nuisances: tolerances of the machine, its initial conditions, zeros of the sensors.
+
+They share numbers with the effects.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import fields, replace
+from itertools import product
 import math
 
 from antenna_drive.diagnosis.field_test import FieldTest
+from antenna_drive.diagnosis.gust import everyday_wind, WIDEST
 from antenna_drive.diagnosis.modifiers import (
-    add, AntennaParameter, Modifier, RecorderError, scale, SupplyGain, Unrecorded,
+    ADD, add, AntennaParameter, KnownModifiers, Modifier, RecorderError, scale, SupplyGain,
+    Unrecorded,
 )
 from antenna_drive.diagnosis.recorded_command import RecordedCommand
 from antenna_drive.readings import Reading, READINGS
 from antenna_drive.recording.sheet import Tolerances, USUAL
+import numpy as np
+from simgap.machine.contract import Effect, Nuisances, Parameter, Point
 
 # The numbers that the configuration knows only within the tolerance of the test sheet.
 TOLERANT_MOTOR = (
@@ -26,19 +35,26 @@ TOLERANT_MOTOR = (
     'gearbox.stiffness', 'gearbox.half_gap', 'gearbox.contact_damping',
 )
 TOLERANT_DRIVE = (
-    'torque_share.circuit.bias_pot', 'torque_share.circuit.fade_out_voltage',
-    'torque_share.circuit.current_to_voltage', 'torque_share.circuit.k_2',
-    'torque_share.circuit.s_2', 'torque_share.circuit.k_3',
-    'torque_share.circuit.g_4', 'torque_share.circuit.saturation_high',
-    'torque_share.filter_1.gain', 'torque_share.filter_1.pole',
-    'torque_share.filter_1.difference_gain',
-    'plant.axis.inertia_hub', 'plant.axis.coulomb_torque', 'plant.axis.stiction_ratio',
+    *(f'torque_share.circuit.{name}' for name in (
+        'bias_pot', 'fade_out_voltage', 'current_to_voltage', 'k_2', 's_2', 'k_3', 'g_4',
+        'saturation_high')),
+    *(f'torque_share.filter_1.{name}' for name in ('gain', 'pole', 'difference_gain')),
+    *(f'plant.axis.{name}' for name in ('inertia_hub', 'coulomb_torque', 'stiction_ratio')),
     *(f'plant.axis.{name}.{j}' for name in (
         'mode_inertias', 'mode_frequencies', 'mode_damping_ratios') for j in range(3)),
 )
 
+# Frictions are warmer or colder from test to test, by this standard deviation as a share.
+_WARMTH = 0.04
+_OF_A_DAY = ('plant.axis.coulomb_torque', 'motor_1.motor.coulomb_torque',
+             'motor_2.motor.coulomb_torque')
+# The rms of a wind that is there every day, as a share of the axis' Coulomb friction.
+_WIND = 0.015
+
 # A jump of the command is felt for about this time [s].
 _FELT_S = 5.0
+# Places inside the gap, as shares of half the gap, at which each motor may start.
+_STARTS = np.linspace(-0.95, 0.95, 13)
 
 
 def nuisances(tests: Sequence[FieldTest], tolerance: float) -> tuple[AntennaParameter, ...]:
@@ -78,11 +94,11 @@ def _of_the_machine(test: FieldTest, tolerance: float) -> Iterator[AntennaParame
         yield relative(name)
 
 
-def allowed(tests: Sequence[FieldTest]) -> Tolerances:
+def _allowed(tests: Sequence[FieldTest]) -> Tolerances:
     """Return the greatest tolerances that the sheets of some tests give, or else usual ones."""
     def greatest(name: str) -> float:
-        given = [value for value in (getattr(test.tolerances, name) for test in tests)
-                 if value is not None]
+        given = [value for test in tests
+                 if (value := getattr(test.sheet.tolerances, name, None)) is not None]
         return max(given, default=getattr(USUAL, name))
 
     return Tolerances(**{item.name: greatest(item.name) for item in fields(Tolerances)})
@@ -90,7 +106,7 @@ def allowed(tests: Sequence[FieldTest]) -> Tolerances:
 
 def _of_zeros_and_recorders(tests: Sequence[FieldTest]) -> Iterator[AntennaParameter]:
     """Yield what may be off beyond the parameters: zeros in the loop, gains, delays."""
-    given = allowed(tests)
+    given = _allowed(tests)
     period = max(test.period for test in tests)
     for m in (1, 2):
         motor = f'motor_{m}'
@@ -110,7 +126,7 @@ def _of_zeros_and_recorders(tests: Sequence[FieldTest]) -> Iterator[AntennaParam
                           low=0.0)
 
 
-def starting_places(k: int, test: FieldTest) -> tuple[AntennaParameter, ...]:
+def _starting_places(k: int, test: FieldTest) -> tuple[AntennaParameter, ...]:
     """Return where in its gap each motor starts in test k, as a share of half the gap."""
     return tuple(AntennaParameter(
         f'start:{test.name}.{motor}', '1', -1.0, 1.0, 0.05, 0.6, experiment=k,
@@ -118,11 +134,21 @@ def starting_places(k: int, test: FieldTest) -> tuple[AntennaParameter, ...]:
 
 
 def _of_a_test(k: int, test: FieldTest, tolerance: float) -> Iterator[AntennaParameter]:
-    yield from starting_places(k, test)
+    yield from _starting_places(k, test)
     if test.record['torque_share']['circuit']['bias_source'][0] == 1:
         yield _within(f'supply:{test.name}', '1', tolerance, SupplyGain(), k)
     yield AntennaParameter(f'clock:{test.name}', 's', -0.01, 0.01, 1e-4, 1e-3, experiment=k,
                            modifier=RecorderError('clock'))
+
+    for path in _OF_A_DAY:
+        yield AntennaParameter(f'day:{path}:{test.name}', '1', -WIDEST * _WARMTH,
+                               WIDEST * _WARMTH, 0.01, _WARMTH, experiment=k,
+                               modifier=scale(path))
+    axis = test.record['plant']['axis']
+    friction = float(axis['coulomb_torque'][0] * axis['friction_torque_per_ampere'][0]
+                     * axis['gear_ratio'][0])
+    yield from everyday_wind(k, test.name, float(test.time[0]), float(test.time[-1]),
+                             _WIND * friction)
 
     if isinstance(test.command, RecordedCommand):
         command = test.command
@@ -140,24 +166,78 @@ def _of_a_test(k: int, test: FieldTest, tolerance: float) -> Iterator[AntennaPar
             yield _within(f'hole:{test.name}:{begin:.3f}', 'rad/s',
                           2.0 * float(command.uncertainty[i]), Unrecorded('hole_means', i), k)
 
-    given = allowed([test])
+    given = _allowed([test])
     if given.clock_ppm:
         yield _within(f'clock_rate:{test.name}', '1', 1e-6 * given.clock_ppm,
                       RecorderError('clock_rate'), k)
 
-    def zero(reading: Reading, half_width: float, step: float, sigma: float) -> AntennaParameter:
-        return AntennaParameter(
-            f'zero:{reading.name}:{test.name}', reading.unit, -half_width, half_width, step, sigma,
-            experiment=k, modifier=RecorderError('zero', reading.name))
+    def zero(reading: Reading, half_width: float) -> AntennaParameter:
+        return _within(f'zero:{reading.name}:{test.name}', reading.unit, half_width,
+                       RecorderError('zero', reading.name), k)
 
     # an encoder counts on from an angle that is not known where the start is not
     wide = 1.0 if test.known_start else 50.0
     for reading in READINGS:
         if reading.sensor.is_counter:
-            yield zero(reading, 4e-5 * wide, 2e-6, 1e-5 * wide)
+            yield replace(zero(reading, 4e-5 * wide), step=2e-6, prior_sigma=1e-5 * wide)
     for reading in READINGS:
         allowance = reading.sensor.zero
         size = (getattr(given, allowance.key) if allowance
                 else 2.0 * float(test.sensors.errors(reading).scatter))
         if size:
-            yield zero(reading, size, 0.3 * size, size / math.sqrt(3.0))
+            yield zero(reading, size)
+
+
+class AntennaNuisances(Nuisances):
+    """
+    The tolerances of the antenna drive in some tests; what they do is registered in `modifiers`.
+
+    Starting places of both motors inside their gaps are tried in all combinations: where a bias
+    closes both gaps at once, each motor's place looks right or wrong by the other's. One after the
+    other they end in a wrong pair.
+    """
+
+    def __init__(self, tolerances: Sequence[AntennaParameter], tests: Sequence[FieldTest],
+                 modifiers: KnownModifiers) -> None:
+        super().__init__(tolerances, {k: [[
+            {first.name: one, second.name: other}
+            for one, other in product(_STARTS.tolist(), repeat=2)]]
+            for k, test in enumerate(tests) for first, second in [_starting_places(k, test)]})
+        self._modifiers = modifiers
+        modifiers.register(tolerances)
+        # the nuisance that changes the same number in the same way
+        self._tolerance_of = {(item.modifier.fields[0], item.modifier.how): item
+                              for item in tolerances
+                              if item.experiment is None and item.modifier.fields}
+
+    def absorb(self, point: Point, removed: Point) -> dict[str, float]:
+        """Return the tolerances that take over what they can of an effect that is removed."""
+        result = dict(point)
+        for name, value in removed.items():
+            modifier = self._modifiers.of(name)
+            for path in modifier.fields:
+                tolerance = self._tolerance_of.get((path, modifier.how))
+                if tolerance is None or tolerance.name not in result:
+                    continue
+                one = result[tolerance.name]
+                both = (one + value if modifier.how == ADD else
+                        (1.0 + one) * (1.0 + value) - 1.0)
+                result[tolerance.name] = min(max(both, tolerance.low), tolerance.high)
+        return result
+
+
+def tolerated(effect: Effect, tolerances: Sequence[AntennaParameter]) -> Effect:
+    """Return an effect whose parameters know by how much their numbers may be off anyway."""
+    allowed = {(path, item.modifier.how): math.sqrt(3.0) * item.prior_sigma for item in tolerances
+               if item.experiment is None for path in item.modifier.fields}
+
+    def known(item: Parameter) -> Parameter:
+        assert isinstance(item, AntennaParameter)
+        modifier: Modifier = item.modifier
+        same_number = min(
+            (allowed.get((path, modifier.how), 0.0) for path in modifier.fields), default=0.0)
+        return replace(item, tolerance=max(item.tolerance, same_number))
+
+    return replace(effect, forms=tuple(
+        replace(form, parameters=tuple(known(p) for p in form.parameters))
+        for form in effect.forms))

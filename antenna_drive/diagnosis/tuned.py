@@ -16,13 +16,13 @@ import tempfile
 
 from antenna_drive.diagnosis.corrected import correct
 from antenna_drive.diagnosis.machine import AntennaMachine
-from antenna_drive.emulator.unit import FloatArray
 from antenna_drive.parameters.loading import load
 from antenna_drive.parameters.sets import Drive
 from antenna_drive.readings import READINGS
 from antenna_drive.recording.recording import Recording
 import numpy as np
 from simgap.fit.least_squares import LeastSquares
+from simgap.fit.robust_loss import robust_level
 from simgap.fit.starts import with_initial_conditions
 from simgap.fit.state import FitState
 from simgap.search.hypothesis import Hypothesis
@@ -81,21 +81,12 @@ def _outside(problem: LeastSquares, state: FitState) -> tuple[str, ...]:
         there = np.isfinite(left[:, column])
         if predicted is None or not there.any():
             continue
-        level = problem.scale * _size(left[there, column])
+        level = problem.scale * robust_level(left[there, column], DEFAULT.fit.outlier)
         if level > _NOISE:
             apart = (test.measured - predicted)[there, column]
             found.append((level, f'{reading.signal}: {np.sqrt(np.mean(apart**2)):.3g} '
                                  f'{reading.unit} rms, {level:.0f} times its noise'))
     return tuple(line for _, line in sorted(found, reverse=True))
-
-
-def _size(z: FloatArray) -> float:
-    """Return the size of residuals [of noise]; the few that are far off count as outliers."""
-    z = np.abs(z)
-    level = float(np.sqrt(np.mean(z**2)))
-    for _ in range(10):
-        level = float(np.sqrt(np.mean(np.minimum(z, DEFAULT.fit.outlier * level)**2)))
-    return level
 
 
 def loaded(text: str) -> Drive:

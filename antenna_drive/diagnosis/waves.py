@@ -8,16 +8,13 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from antenna_drive.diagnosis.modifiers import (
-    AntennaParameter, ReadingModifier, RunModifier, RunSetup, SensorReadings,
+    AntennaParameter, ReadingModifier, RunModifier, RunSetup, SensorReadings, WaveShape,
 )
-from antenna_drive.diagnosis.wave_shape import WaveShape
 import numpy as np
 from simgap.machine.contract import Form
 
 _PARTS = ('sine', 'cosine', 'cycles_change', 'second_sine', 'second_cosine', 'third_sine',
           'third_cosine')
-
-
 _CYCLES = ' cycles per revolution'
 # The waves of the drive that follow a motor's angle: unit, part and name.
 _OF_MOTORS = tuple((motor, part, stem) for motor in ('motor_1', 'motor_2') for part, stem in (
@@ -41,28 +38,31 @@ def fastest_wave(record: np.ndarray[Any, np.dtype[Any]]) -> float:
 
 
 @dataclass(frozen=True)
-class _WavePart(RunModifier):
-    """One part of a wave of the drive."""
+class _Part:
+    """One part of a wave."""
 
     shape: WaveShape
     index: int
+
+    def put(self, into: RunSetup | SensorReadings, value: float) -> None:
+        into.waves.setdefault(self.shape, [0.0] * len(_PARTS))[self.index] = value
+
+
+class _WavePart(_Part, RunModifier):
+    """Of the drive."""
 
     def apply(self, run: RunSetup, value: float) -> None:
-        run.waves.setdefault(self.shape, [0.0] * len(_PARTS))[self.index] = value
+        self.put(run, value)
 
 
-@dataclass(frozen=True)
-class _ReadingWavePart(ReadingModifier):
-    """One part of a wave of the encoder's reading."""
-
-    shape: WaveShape
-    index: int
+class _ReadingWavePart(_Part, ReadingModifier):
+    """Of the encoder's reading."""
 
     def apply_to_readings(self, readings: SensorReadings, value: float) -> None:
-        readings.waves.setdefault(self.shape, [0.0] * len(_PARTS))[self.index] = value
+        self.put(readings, value)
 
     def write(self, run: RunSetup, value: float) -> bool:
-        run.waves.setdefault(self.shape, [0.0] * len(_PARTS))[self.index] = value
+        self.put(run, value)
         return True
 
 
@@ -95,7 +95,7 @@ class Wave(Form):
         parameters = []
         for part in self.parameters:
             assert isinstance(part, AntennaParameter)
-            assert isinstance(part.modifier, (_WavePart, _ReadingWavePart))
+            assert isinstance(part.modifier, _Part)
             parameters.append(replace(part, name=f'{part.name}@{order:g}',
                                       modifier=replace(part.modifier, shape=shape)))
         return replace(self, name=f'{order:g}{_CYCLES}',
@@ -115,13 +115,10 @@ def wave(unit: str, limit: float, step: float, shape: WaveShape, orders: tuple[f
     """
     made = _ReadingWavePart if on_readings else _WavePart
 
-    def part(index: int) -> AntennaParameter:
-        name = _PARTS[index]
-        bound, unit_, step_ = ((0.05, '1', 2e-4) if name == 'cycles_change' else
-                               (limit, unit, step))
-        return AntennaParameter(name, unit_, -bound, bound, step_,
-                                is_shape=index > 1, modifier=made(shape, index),
+    def part(index: int, name: str) -> AntennaParameter:
+        range_ = ('1', -0.05, 0.05, 2e-4) if index == 2 else (unit, -limit, limit, step)
+        return AntennaParameter(name, *range_, is_shape=index > 1, modifier=made(shape, index),
                                 tolerance=healthy if index < 2 else 0.0)
 
-    return Wave('', tuple(part(index) for index in range(len(_PARTS))), is_wave=True,
+    return Wave('', tuple(part(*item) for item in enumerate(_PARTS)), is_wave=True,
                 shape=shape, orders=orders)

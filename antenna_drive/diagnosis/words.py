@@ -69,6 +69,13 @@ def _table() -> dict[str, Any]:
     return found
 
 
+def row_of(component: str, effect: str, number: str = '') -> dict[str, str]:
+    """Return the words of a kind of effect, wherever it is, or those of one of its numbers."""
+    kind = 'motor' if component == 'motors' else component.removesuffix('_1').removesuffix('_2')
+    rows: dict[str, dict[str, str]] = _table()['effects']
+    return rows.get(f'{kind}.{effect}.{number}') or rows[f'{kind}.{effect}']
+
+
 def ratio(change: float, word: str = ' percent') -> str:
     """Return by how much a number differs, without its sign: 40 percent, 930 times."""
     size = abs(change)
@@ -131,9 +138,7 @@ def _amplitude(parts: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
 
 def _said(effect: Effect, name: str, item: AntennaParameter, units: Mapping[str, str],
           record: np.ndarray[Any, np.dtype[Any]]) -> _Said:
-    kind = f'{_kind(effect.component)}.{effect.id.partition(".")[2]}'
-    table = _table()
-    row = table['effects'].get(f'{kind}.{name}') or table['effects'][kind]
+    table, row = _table(), row_of(effect.component, effect.id.partition('.')[2], name)
     number = name.rpartition('_')[2]
     part = table['parts'].get(effect.component, effect.component.replace('_', ' '))
     said = {'part': part, 'mode': f'mode {number}' if number.isdigit() else 'all modes',
@@ -144,11 +149,6 @@ def _said(effect: Effect, name: str, item: AntennaParameter, units: Mapping[str,
                  units.get(_entry(fields[0]), '') if fields else '', item.modifier.how,
                  (f'inspect {row["inspect"].format(**said)}', table['predict'],
                   f'repeat {table["tests"].get(row["repeat"], row["repeat"])}'))
-
-
-def _kind(component: str) -> str:
-    """Return the kind of a component: a motor, a gearbox, a sensor."""
-    return 'motor' if component == 'motors' else component.removesuffix('_1').removesuffix('_2')
 
 
 def _changed(path: str) -> str:

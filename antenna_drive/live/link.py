@@ -60,13 +60,13 @@ class DriveLink:
     twins : those that report in the same ROS 2 domain
     """
 
-    def __init__(self, board: Board, namespace: str = '', domain_id: int | None = None) -> None:
+    def __init__(self, board: Board, namespace: str = '') -> None:
         """Join; the drive may come later. News goes to the board."""
         choose_transport(os.environ)
         self._board = board
         self.namespace = '/' + namespace.strip('/') if namespace.strip('/') else ''
         context = Context()
-        context.init(args=[], domain_id=domain_id)
+        context.init(args=[])
         self._node = Node(f'live_{os.getpid()}', namespace=self.namespace, context=context)
         self.history = History({unit: len(signals) for unit, signals in OUTPUTS.items()},
                                TEST_SIGNAL)

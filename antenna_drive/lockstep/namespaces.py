@@ -11,7 +11,7 @@ undiscovered, nodes that somebody starts later or on another machine, the frames
 senders.
 """
 
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 import os
 import secrets
@@ -36,15 +36,12 @@ class AnotherDrive(UserError):
 
 
 @contextmanager
-def drive_namespace(given: str | None, command: str, domain_id: int | None = None,
-                    units: Collection[str] = UNITS) -> Iterator[str]:
+def drive_namespace(given: str | None, command: str) -> Iterator[str]:
     """
     Give a drive its namespace, as long as it runs.
 
     given : the namespace that was asked for, '' or '/' for none; None for one of the drive's own
     command : what the drive is started for; a namespace of its own begins with it
-    domain_id : the ROS 2 domain; None for the one in the environment
-    units : the names of the drive's nodes
 
     Yields the namespace, '/east', or '' for none.
 
@@ -57,7 +54,7 @@ def drive_namespace(given: str | None, command: str, domain_id: int | None = Non
     namespace = f'/{given.strip("/")}'.rstrip('/')
     choose_transport(os.environ)
     context = Context()
-    context.init(args=[], domain_id=domain_id)
+    context.init(args=[])
     try:
         node = Node(f'look_{os.getpid()}', namespace=namespace, context=context)
     except ValueError as error:  # rclpy names what is wrong with it
@@ -66,7 +63,7 @@ def drive_namespace(given: str | None, command: str, domain_id: int | None = Non
     domain = context.get_domain_id()
     with held(f'antenna_drive/drive/{domain}{namespace}') as free:
         try:
-            found = _seen(node, namespace, units) if free else list(units)
+            found = _seen(node, namespace) if free else list(UNITS)
         finally:
             leave(node)
         if found:
@@ -76,12 +73,12 @@ def drive_namespace(given: str | None, command: str, domain_id: int | None = Non
         yield namespace
 
 
-def _seen(node: Node, namespace: str, units: Collection[str]) -> list[str]:
-    """Return the units whose names nodes have in a namespace."""
+def _seen(node: Node, namespace: str) -> list[str]:
+    """Return the units of the drive whose names nodes have in a namespace."""
     deadline = time.monotonic() + _LOOK_S
     while True:
         there = set(node.get_node_names_and_namespaces())
-        found = [unit for unit in units if (unit, namespace or '/') in there]
+        found = [unit for unit in UNITS if (unit, namespace or '/') in there]
         if found or time.monotonic() > deadline:
             return found
         time.sleep(_GLANCE_S)

@@ -75,7 +75,7 @@ class Observer:
 
     def __init__(self, name: str, on_step: OnStep, *, on_begin: OnBegin | None = None,
                  on_change: OnChange | None = None, namespace: str = '',
-                 domain_id: int | None = None, guest: bool = False,
+                 guest: bool = False,
                  outputs: Mapping[str, Sequence[Signal]] = OUTPUTS) -> None:
         """
         Join a drive.
@@ -88,7 +88,7 @@ class Observer:
             be step 0, and it may join the same run twice: what came before is void
         on_change : called as on_change(unit, record) with what a node says on `<unit>/changes`,
             see `changes`; from another thread
-        namespace, domain_id : where the drive is; None for the domain in the environment
+        namespace : where the drive is
         guest : True for an observer that nobody waits for
         outputs : the signals of each unit
         """
@@ -97,7 +97,7 @@ class Observer:
             f'{unit}/{signal.name}' for unit, signals in outputs.items() for signal in signals)
         self._on_begin = on_begin
         context = Context()
-        context.init(args=[], domain_id=domain_id)
+        context.init(args=[])
         self.node = Node(name, namespace=namespace, context=context)
         birth = float(time.time_ns() // 1000)
         reader = _Reader(name, self.names, on_step)

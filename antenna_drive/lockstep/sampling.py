@@ -34,25 +34,22 @@ class Sampled:
 
 def sample_processes(steps: int, step_s: float, *, name: str = 'observer',
                      settings: Mapping[str, Parameter] | None = None,
-                     config: Sequence[str] = (), pace: float = 0.0, namespace: str | None = None,
-                     domain_id: int | None = None,
+                     config: Sequence[str] = (),
                      progress: Callable[[int], None] | None = None) -> Sampled:
     """
-    Run the drive in five processes and keep every sample of every signal.
+    Run the drive in five processes, as fast as possible, and keep every sample of every signal.
 
     steps, step_s : number and length [s] of the macro-steps
-    name : name of the observing node, and of the drive's own namespace
+    name : name of the observing node, and of the namespace of the drive's own in which it runs
     settings : parameters of the drive by dotted name, such as 'torque_share.circuit.bias_pot'
-    config, domain_id : see DriveProcesses
-    namespace : None for one of the drive's own, see drive_namespace
-    pace : how many times faster than real time, 0 for as fast as possible
+    config : see DriveProcesses
     progress : called with the step about ten times a second
 
-    Raises AnotherDrive: the namespace is not free, or nodes of others have taken part.
+    Raises AnotherDrive: nodes of others have taken part.
     Raises UserError: a process has ended by itself or the drive does not go on.
     """
     given: dict[str, dict[str, Parameter]] = {
-        TEST_SIGNAL: {'run.step': float(step_s), 'run.pace': float(pace),
+        TEST_SIGNAL: {'run.step': float(step_s), 'run.pace': 0.0,
                       'run.duration': steps * step_s, 'run.observers': [name]}}
     for parameter, value in (settings or {}).items():
         unit, key = home(parameter)
@@ -70,10 +67,9 @@ def sample_processes(steps: int, step_s: float, *, name: str = 'observer',
             samples[k] = values
             watch.done = k
 
-    with drive_namespace(namespace, name, domain_id) as space, Observer(
-            name, take, on_begin=begin, namespace=space, domain_id=domain_id) as observer, \
-            DriveProcesses(given, config=config, namespace=space,
-                           domain_id=domain_id) as processes:
+    with drive_namespace(None, name) as space, Observer(
+            name, take, on_begin=begin, namespace=space) as observer, \
+            DriveProcesses(given, config=config, namespace=space) as processes:
         moments['started'] = time.monotonic()
         samples = np.zeros((steps + 1, len(observer.names), 2))
         observer.spin(lambda: watch.complete(processes, observer))

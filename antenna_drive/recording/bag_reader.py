@@ -7,7 +7,7 @@ from pathlib import Path
 import warnings
 
 from antenna_drive.emulator.wiring import signal_names
-from antenna_drive.recording.bag import CONFIGURATION, METADATA, NOTES
+from antenna_drive.recording.bag import CONFIGURATION, MESSAGE_TYPE, METADATA, NOTES
 from antenna_drive.recording.bag_storage import DamageError, PACKED, read_storage, Storage
 from antenna_drive.recording.csv_format import parse_known
 from antenna_drive.recording.recording import Recording, unit_of
@@ -17,6 +17,7 @@ from simgap.errors import one_line
 from simgap.inputs.plain import from_json, PlainDataError
 from simgap.inputs.plain_yaml import parse_yaml, read_yaml
 from simgap.inputs.schema import ParameterError
+from simgap.logs.bags import REMEDY
 from simgap.logs.channel import make_channel, NANOSECONDS, RecordingError, RecordingWarning
 
 LONGEST_NAME = 255  # characters of a file's name; no file system of today takes more
@@ -107,7 +108,7 @@ def _files(path: Path) -> tuple[list[Path], dict[str, int] | None]:
         raise RecordingError(f'{path / METADATA}: no description of a bag') from None
     if storage != 'mcap':
         raise RecordingError(f'{path}: storage {one_line(repr(storage), 30)}, but only mcap is '
-                             'read here; ros2 bag convert changes it')
+                             f'read without a map. {REMEDY}; ros2 bag convert makes mcap of it')
     if compression not in ('', 'none', None) and packed != ('file', 'zstd'):
         raise RecordingError(f'{path}: compressed by {one_line(repr(compression), 30)}, which is '
                              'not read here; MCAP compresses its own chunks, and files as a whole '
@@ -146,6 +147,9 @@ def _check_counts(storage: Storage, counts: dict[str, int] | None) -> None:
 
 
 def _recording(storage: Storage) -> Recording:
+    if storage.skipped and not storage.samples:
+        raise RecordingError(f'no topic of {MESSAGE_TYPE} is there, and others are not read '
+                             f'without a map. {REMEDY}')
     namespace = _namespace(list(storage.samples))
     channels = {}
     for topic, parts in storage.samples.items():

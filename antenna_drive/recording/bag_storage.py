@@ -84,9 +84,9 @@ class Storage:
             raise DamageError(f'topic {topic.id} is defined twice')
         self.topics[topic.id] = topic
         schema = self.schemas.get(topic.schema_id)
-        if schema is None:
+        if schema is None and topic.schema_id:
             raise DamageError(f'topic {one_line(topic.topic)} has no message type')
-        if schema.name != MESSAGE_TYPE or topic.message_encoding != 'cdr':
+        if schema is None or schema.name != MESSAGE_TYPE or topic.message_encoding != 'cdr':
             self.skipped.add(topic.topic)
             return
         if len(self.samples) >= SIGNALS.value():

@@ -10,6 +10,7 @@ from antenna_drive.recording.csv_format import read_csv
 from antenna_drive.recording.recording import Recording, unit_of
 from antenna_drive.recording.sheet import load_sheet, TestSheet
 from simgap.logs import column_map
+from simgap.logs.bags import REMEDY
 from simgap.logs.channel import RecordingError
 from simgap.logs.column_map import ImportMap, KnownSignals
 from simgap.logs.mapped import read_mapped
@@ -37,8 +38,8 @@ def read_recording(path: str | Path, *, partial: bool = False) -> Recording:
         from antenna_drive.recording.bag_reader import read_bag
         return read_bag(path, partial=partial)
     if path.suffix != '.csv':
-        raise RecordingError(f'{path}: no recording; allowed are a bag (a folder, .mcap or '
-                             '.mcap.zstd) and .csv')
+        raise RecordingError(f'{path}: no recording that is read without a map; allowed are a bag '
+                             f'(a folder, .mcap or .mcap.zstd) and .csv. {REMEDY}')
     return read_csv(path)
 
 

@@ -59,7 +59,6 @@ class GrowingVerdict:
 
     executor : that looks, one at a time
     drive : the configuration
-    rule : when to stop
     diagnose : what it does, a function of a module
 
     looks : what they said, in the order of time
@@ -67,12 +66,12 @@ class GrowingVerdict:
     fault : why the last look has failed; '' if it has not
     """
 
-    def __init__(self, executor: Executor, drive: Drive, rule: Rule | None = None,
+    def __init__(self, executor: Executor, drive: Drive,
                  diagnose: Callable[[Mapping[str, Recording], Drive], dict[str, Any]] = diagnosed,
                  ) -> None:
         """Begin with no test."""
         self._executor, self._drive, self._diagnose = executor, drive, diagnose
-        self.rule = rule or Rule()
+        self.rule = Rule()
         self._tests: dict[str, Recording] = {}
         self._running: tuple[Future[dict[str, Any]], list[float]] | None = None
         self._looked_at_s = 0.0

@@ -74,7 +74,6 @@ class Twin:
     tune : returns the configuration with the tolerances of a quiet record in it, and what is
         beyond them; None: it stays as it is
     outside : what an earlier quiet record had beyond the tolerances; None: nobody has compared it
-    step_s : macro-step [s]
 
     tuned : what became of the tuning, for people
     configuration : text of the tuned configuration; '' if it is as it was
@@ -86,8 +85,7 @@ class Twin:
 
     def __init__(self, drive: Drive, sheet: TestSheet | None = None,
                  settings: TwinSettings | None = None, baseline: Baseline | None = None,
-                 tune: Tune | None = None, outside: tuple[str, ...] | None = None,
-                 step_s: float = MACRO_STEP) -> None:
+                 tune: Tune | None = None, outside: tuple[str, ...] | None = None) -> None:
         """Begin with nothing known of the real drive."""
         self.settings = settings or TwinSettings()
         self.sheet = sheet or TestSheet()
@@ -96,7 +94,7 @@ class Twin:
         self.faults = InputFaults(self.intake, self.settings.stale_s)
         self.judge = BlockJudge(self.settings.alarms_per_day, self.settings.reference,
                                 self.settings.clip)
-        self._step_s, self._tune = step_s, tune
+        self._tune = tune
         self.tuned, self.configuration, self.outside = '', '', outside
         self._stretch, self._run_in = 0, self.settings.run_in_s
         self._given: dict[str, int] = {}
@@ -106,7 +104,7 @@ class Twin:
 
     def _build(self, drive: Drive) -> None:
         """Take another configuration, and begin again."""
-        self._shadow = Shadow(*under_test(self.sheet, drive, self._step_s), self._step_s)
+        self._shadow = Shadow(*under_test(self.sheet, drive, MACRO_STEP), MACRO_STEP)
         self._columns = [self._shadow.names.index(name) for name in SIGNALS]
         self._command = self._shadow.names.index(RATE_COMMAND)
         self._begin()
@@ -163,7 +161,7 @@ class Twin:
             kept = slice((-first) % _EVERY, None, _EVERY)
             values = samples[kept, :, 0]
             self._course.add((grid[kept] - start) / NANOSECONDS, values[:, self._columns],
-                             values[:, self._command], _EVERY * self._step_s)
+                             values[:, self._command], _EVERY * MACRO_STEP)
         compared = self._compare()
         self._judge()
         return compared

@@ -70,7 +70,7 @@ machine = own_machine(
               'current': reading('A', noise=0.02, column='current_A')},
     effects=[
         effect('gearbox.compliance', cause='gear and shaft twist',
-               compliance=size(0.0, 1.0, 'rad/(N m)')),
+               compliance=size(0.0, 1.0, 'rad/(N m)', tolerance=0.2 * TEETH)),
         effect('gearbox.backlash', cause='there is a gap between the teeth',
                half_gap=size(0.0, 0.2, 'rad', step=2e-3)),
         effect('motor.friction_asymmetry', cause='friction depends on the direction',

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from simgap.fit.blas import one_blas_thread
 from simgap.fit.least_squares import LeastSquares
 from simgap.machine.contract import Machine
-from simgap.search.full_fits import FullFits
 from simgap.search.search import Search
 from simgap.settings import DEFAULT, Settings
 from simgap.verdict import verdict
@@ -29,6 +28,5 @@ def _untold(share: float, doing: str) -> None:
 def rank_hypotheses(machine: Machine, settings: Settings = DEFAULT) -> Ranking:
     """Search for the effects that a machine lacks, and rank what was found."""
     with one_blas_thread():
-        whole = LeastSquares(machine, settings=settings)
-        found = FullFits(whole, _untold).compared(*Search(whole, _untold).run())
-    return Ranking(verdict.rank(found, 0.0, settings), verdict.confusable(found, settings))
+        found = Search(LeastSquares(machine, settings=settings), _untold).run()
+    return Ranking(verdict.ranked(found, 0.0), verdict.confusable(found))

@@ -190,12 +190,13 @@ def _singles(problem: LeastSquares) -> list[Hypothesis]:
     for effect in problem.machine.catalogue.values():
         forms = []
         for form in effect.forms:
-            values = [p.start for p in form.parameters]
             # the derivatives are taken where every size is zero, and shapes are at their start
-            point = {**state.point(), **{p.name: p.start if p.is_shape else 0.0
-                                         for p in form.parameters}}
-            columns = problem.jacobian(point, form.parameters, state.residual, central=False)
-            wider = problem.extended(state, form.parameters, values, columns)
+            point = {**state.point(), **form.start}
+            columns = problem.jacobian({**state.point(), **{
+                p.name: p.start if p.is_shape else 0.0 for p in form.parameters}},
+                form.parameters, state.residual, central=False)
+            wider = problem.start((*state.parameters, *form.parameters), point,
+                                  np.column_stack([state.jacobian, columns]))
             forms.append(Hypothesis((effect.id,), (form,), problem.fit(wider, ITERATIONS)))
         found.append(min(forms, key=lambda c: c.cost))
     return sorted(found, key=lambda c: c.cost)

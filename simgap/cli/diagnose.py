@@ -32,7 +32,7 @@ from simgap.errors import UserError
 from simgap.inputs.schema import Entry
 
 if TYPE_CHECKING:
-    from simgap.next_test.rivals import Rival
+    from simgap.search.rival import Rival
     from simgap.settings import Settings
     from simgap.verdict.record import Verdict
 

@@ -84,12 +84,13 @@ def replaced(path: Path) -> Iterator[IO[bytes]]:
 
 class Progress:
     """
-    One line on standard error that shows how far long work has got.
+    One line on standard error that shows how far long work has got; none if `quiet` is asked for.
 
-    Silent where nobody watches: standard error is not a terminal, or `quiet` is asked for.
+    Where standard error is no terminal, such as a log, it is a line of its own every half minute.
     """
 
     REFRESH_S = 0.1
+    LINE_S = 30.0
 
     def __init__(self, label: str, total: float, *, quiet: bool = False,
                  stream: TextIO | None = None) -> None:
@@ -99,9 +100,10 @@ class Progress:
         self._label = label
         self._total = total
         self._stream = sys.stderr if stream is None else stream
-        self._shown = not quiet and self._stream.isatty()
+        self._shown = not quiet
+        self._on_terminal = self._stream.isatty()
         self._started = time.monotonic()
-        self._refreshed = -math.inf
+        self._refreshed = -math.inf if self._on_terminal else self._started
 
     def __enter__(self) -> Progress:
         """Show the line at zero."""
@@ -111,7 +113,7 @@ class Progress:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
                  trace: TracebackType | None) -> None:
         """Leave the line complete, or as far as the work got."""
-        if self._shown:
+        if self._shown and self._on_terminal:
             if kind is None:
                 self._draw(self._total)
             self._stream.write('\n')
@@ -120,7 +122,8 @@ class Progress:
     def update(self, done: float) -> None:
         """Show that `done` of the total is done; cheap enough to call at every turn."""
         now = time.monotonic()
-        if self._shown and now - self._refreshed >= self.REFRESH_S:
+        pause = self.REFRESH_S if self._on_terminal else self.LINE_S
+        if self._shown and now - self._refreshed >= pause:
             self._refreshed = now
             self._draw(done)
 
@@ -128,7 +131,8 @@ class Progress:
         part = min(1.0, max(0.0, done / self._total))
         bar = '#' * round(30 * part)
         spent = time.monotonic() - self._started
-        self._stream.write(f'\r{self._label}  [{bar:<30}] {100 * part:3.0f} %  {spent:.0f} s')
+        line = f'{self._label}  [{bar:<30}] {100 * part:3.0f} %  {spent:.0f} s'
+        self._stream.write(f'\r{line}' if self._on_terminal else f'{line}\n')
         self._stream.flush()
 
 

@@ -9,7 +9,8 @@ from simgap.errors import one_line
 
 # By module. A package that needs more adds to it when it is imported.
 REMEDIES = {module: f'pip install {name}' for module, name in {
-    'yaml': 'PyYAML', 'jinja2': 'Jinja2', 'mujoco': 'mujoco', 'fmpy': 'fmpy'}.items()}
+    'yaml': 'PyYAML', 'jinja2': 'Jinja2', 'mujoco': 'mujoco', 'fmpy': 'fmpy', 'mcap': 'mcap',
+    'rosbags': 'rosbags', 'mcap_protobuf': 'mcap-protobuf-support'}.items()}
 
 
 def remedy(error: ImportError) -> str | None:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import blas
 from simgap.machine.contract import FloatArray
 from simgap.settings import FitSettings
 
@@ -59,8 +60,7 @@ class BroydenModel:
     def reweight(self, weight: FloatArray, weighted_residual: FloatArray) -> None:
         """Take new weights and residuals; recompute the Hessian if the weights moved much."""
         if float(np.mean(np.abs(weight - self._hessian_weight))) > self._settings.stale_weights:
-            self.hessian = weighted_product(
-                updated(self.jacobian, self.errors, self.directions), weight)
+            self.hessian = updated_product(self.jacobian, self.errors, self.directions, weight)
             self._hessian_weight = weight
         self._slope = transposed_product(self.jacobian, weighted_residual)
 
@@ -78,8 +78,26 @@ def transposed_product(jacobian: Jacobian, vector: FloatArray) -> FloatArray:
     return np.asarray(jacobian.T @ vector.astype(np.float32), np.float64)
 
 
+def updated_product(jacobian: Jacobian, errors: Sequence[FloatArray],
+                    directions: Sequence[FloatArray], weight: FloatArray) -> FloatArray:
+    """Return the `weighted_product` of a Jacobian with Broyden's updates, without making it."""
+    product = weighted_product(jacobian, weight)
+    if errors:
+        added, along = np.array(errors, np.float32).T, np.array(directions, np.float64)
+        cross = weighted_product(jacobian, weight, added) @ along
+        product += cross + cross.T + along.T @ weighted_product(added, weight) @ along
+    return product
+
+
 def weighted_product(jacobian: Jacobian, weight: FloatArray,
                      other: Jacobian | None = None) -> FloatArray:
     """Return jacobian^T weight jacobian, or other in place of the second, shape (m, m)."""
-    other = jacobian if other is None else other
-    return np.asarray(jacobian.T @ (weight.astype(np.float32)[:, np.newaxis] * other), np.float64)
+    if other is not None:
+        weighted = weight.astype(np.float32)[:, np.newaxis] * other
+        return np.asarray(jacobian.T @ weighted, np.float64)
+    if not jacobian.size:
+        return np.zeros((jacobian.shape[1],) * 2)
+    # half of a symmetric product is enough
+    root = np.ascontiguousarray(np.sqrt(weight).astype(np.float32)[:, np.newaxis] * jacobian)
+    half = np.asarray(blas.ssyrk(1.0, root.T), np.float64)
+    return half + np.triu(half, 1).T

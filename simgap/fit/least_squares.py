@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
@@ -13,7 +12,7 @@ from numpy.typing import NDArray
 from simgap.fit.broyden import Jacobian
 from simgap.fit.levenberg_marquardt import LevenbergMarquardt
 from simgap.fit.noise import whitened
-from simgap.fit.robust_loss import robust_loss, robust_weight
+from simgap.fit.robust_loss import robust_level, robust_loss, robust_weight
 from simgap.fit.state import FitState, point_of, prior_precision
 from simgap.machine.contract import FloatArray, Machine, Parameter, Point
 from simgap.settings import DEFAULT, Settings
@@ -49,18 +48,6 @@ class LeastSquares:
         """Return the same problem at another noise scale."""
         return LeastSquares(self.machine, scale=scale, settings=self.settings)
 
-    def of_experiment(self, experiment: int) -> LeastSquares:
-        """Return the problem in which one experiment alone counts, at the sensors' own noise."""
-        return LeastSquares(self.machine, [
-            np.full(e.time.size, k == experiment) for k, e in enumerate(self.experiments)],
-            settings=self.settings)
-
-    def best_fitted(self, state: FitState) -> int:
-        """Return the experiment with the least loss per sample."""
-        return int(np.argmin([
-            self.loss(state.residual[self.rows(k)]) / max(self.valid[self.rows(k)].sum(), 1)
-            for k in range(len(self.experiments))]))
-
     def rows(self, experiment: int) -> slice:
         """Return where an experiment's residuals lie."""
         end = int(self.ends[experiment])
@@ -88,10 +75,9 @@ class LeastSquares:
             z = np.nan_to_num(z, nan=bound, posinf=bound, neginf=-bound)
         return np.asarray(np.clip(z, -bound, bound, out=z))
 
-    def residuals(self, point: dict[str, float], alone: int | None = None) -> FloatArray:
-        """Return the residuals at a point, shape (n,); of one experiment if it is named."""
-        alone = self._alone if alone is None else alone
-        return self._row(self.machine.simulate([point], None if alone is None else [alone])[0])
+    def residuals(self, point: dict[str, float]) -> FloatArray:
+        """Return the residuals at a point, shape (n,)."""
+        return self._row(self.machine.simulate([point], [self._alone])[0])
 
     def residuals_at(self, points: Sequence[Point]) -> FloatArray:
         """Return the residuals at several points, simulated together, shape (points, n)."""
@@ -100,30 +86,9 @@ class LeastSquares:
     def _row(self, result: Sequence[FloatArray | None]) -> FloatArray:
         return np.concatenate([self.standardised(k, values) for k, values in enumerate(result)])
 
-    def rescaled(self, state: FitState, scale: float) -> FitState:
-        """Return a state of a problem with another noise scale, without its Jacobian."""
-        residual = state.residual * (scale / self.scale)
-        return replace(state.without_jacobian(), residual=residual,
-                       cost=self.cost(residual, state.x, prior_precision(state.parameters)))
-
-    def evaluated(self, state: FitState) -> FitState:
-        """Return a state of a problem with other noise as it is in this one, not fitted."""
-        residual = self.residuals(state.point())
-        return replace(state.without_jacobian(keep_hessian=True), residual=residual,
-                       weight=self.weights(residual),
-                       cost=self.cost(residual, state.x, prior_precision(state.parameters)))
-
     def noise_level(self, residual: FloatArray) -> float:
         """Return the size of residuals in standard deviations of the noise, outliers clipped."""
-        z = np.abs(residual[self.valid]) * self.scale
-        level = float(np.sqrt(np.mean(z ** 2)))
-        for _ in range(10):
-            level = float(np.sqrt(np.mean(np.minimum(z, self.settings.fit.outlier * level) ** 2)))
-        return level
-
-    def leaves_much(self, state: FitState) -> bool:
-        """Return whether a fit leaves more than the sensors' noise."""
-        return self.noise_level(state.residual) > self.settings.search.wanting
+        return robust_level(residual[self.valid] * self.scale, self.settings.fit.outlier)
 
     def jacobian(self, point: dict[str, float], parameters: Sequence[Parameter],
                  residual: FloatArray, central: bool,
@@ -182,12 +147,6 @@ class LeastSquares:
             jacobian = self.jacobian(at, parameters, residual, central)
         return self._state(tuple(parameters), x, residual, jacobian, self.weights(residual))
 
-    def start_from(self, known: Sequence[Parameter], columns: Jacobian,
-                   others: Sequence[Parameter], point: dict[str, float]) -> FitState:
-        """Begin a fit at a point; the derivatives by `known` are given, the others taken."""
-        fresh = self.jacobian(point, others, self.residuals(point), central=True)
-        return self.start((*known, *others), point, np.column_stack([columns, fresh]))
-
     def refreshed(self, state: FitState) -> FitState:
         """Return the state with a fresh Jacobian and fresh weights."""
         # Where sticking and slipping bend the prediction, a difference quotient over many standard
@@ -207,14 +166,6 @@ class LeastSquares:
                                 p.least_step), p.step)
                 for p, seen in zip(state.parameters, visible.tolist(), strict=True)
                 if not p.is_shape}
-
-    def extended(self, state: FitState, parameters: Sequence[Parameter],
-                 values: Sequence[float], columns: Jacobian) -> FitState:
-        """Return the state with more parameters, at these values, with these derivatives."""
-        x = np.r_[state.x, values]
-        everything = (*state.parameters, *parameters)
-        return self._state(everything, x, self.residuals(point_of(everything, x)),
-                           np.column_stack([state.jacobian, columns]), state.weight)
 
     def with_columns(self, state: FitState, indices: Sequence[int], columns: Jacobian) -> FitState:
         """Return the state with other derivatives by some of its parameters."""

@@ -31,8 +31,7 @@ class LevenbergMarquardt:
         prior = prior_precision(state.parameters)
         x, residual, cost, weight = state.x, state.residual, state.cost, state.weight
         model = BroydenModel(state.jacobian, state.hessian, weight, residual, options)
-        damping = options.initial_damping
-        idle = 0
+        damping = options.damping
         for _ in range(iterations):
             gradient = model.gradient(weight * residual, prior * x)
             hessian = model.hessian + np.diag(prior)
@@ -40,7 +39,7 @@ class LevenbergMarquardt:
             step = box_constrained_step(hessian + damping * np.diag(diagonal + 1e-12), gradient,
                                         low - x, high - x)
             expected = float(gradient @ step - 0.5 * step @ hessian @ step)
-            if not np.any(step) or expected < options.worth_a_step * options.least_gain:
+            if not np.any(step) or expected < options.least_gain:
                 break
             trial = np.clip(x + step, low, high)
             after = self.residuals(point_of(state.parameters, trial))
@@ -52,14 +51,8 @@ class LevenbergMarquardt:
                 x, residual, cost = trial, after, trial_cost
                 weight = self.weights(residual)
                 model.reweight(weight, weight * residual)
-                good = gained > options.good_step * expected
-                damping = max(damping / (options.damping_decay if good else 1.0),
-                              options.least_damping)
-                idle = idle + 1 if gained < options.least_gain else 0
-                if idle > options.idle_iterations:
-                    break
+                damping = max(damping / options.damping_factor, options.damping)
             else:
-                damping = min(max(damping, options.damping_after_failure) * options.damping_growth,
-                              options.greatest_damping)
+                damping *= options.damping_factor
         return FitState(state.parameters, x, residual, model.jacobian, weight, cost,
                         tuple(model.errors), tuple(model.directions))

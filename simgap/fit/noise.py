@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 from scipy.signal import lfilter
-from simgap.machine.contract import Colour, Experiment, FloatArray
+from simgap.machine.contract import Colour, Experiment, FloatArray, Machine, Point
 from simgap.settings import NoiseSettings
 
 _CORNERS_HZ = (0.15, 0.3, 0.6, 1.2, 2.5, 5.0, 10.0, 20.0)
@@ -75,7 +75,7 @@ def estimated(residuals: Sequence[FloatArray], interval_s: float, slow_limit: fl
         return Process(1.0, 0.0, 0.0)
     sizes = np.concatenate([np.abs(z[np.isfinite(z)]) for z in usable])
     # an outlier is not noise: the loss of the fits copes with it
-    bound = settings.clip * max(float(np.median(sizes)) / 0.6745, settings.least_level)
+    bound = settings.clip * max(float(np.median(sizes)) / 0.6745, 1.0 / settings.greatest_level)
     clipped = [np.clip(z, -bound, bound) for z in usable]
 
     def power(pole: float, gain: float) -> float:
@@ -88,8 +88,19 @@ def estimated(residuals: Sequence[FloatArray], interval_s: float, slow_limit: fl
     if 0.5 * sizes.size * math.log(white / max(best, 1e-12)) < settings.worth_a_colour:
         best, pole, gain = white, 0.0, 0.0
     slow = gain * best * (1.0 - pole ** 2 * (1.0 - gain)) / (1.0 - pole ** 2)
-    level = np.clip((1.0 - gain) * best, settings.least_level ** 2, settings.greatest_level ** 2)
+    most = settings.greatest_level ** 2
+    level = np.clip((1.0 - gain) * best, 1.0 / most, most)
     return Process(float(level), min(slow, slow_limit), pole)
+
+
+def with_noise_left(machine: Machine, point: Point, settings: NoiseSettings,
+                    greatest_level: float) -> Machine:
+    """Return a machine with the noise that is left at a point, in stated noise at most this."""
+    predicted = machine.simulate([point])[0]
+    return machine.with_experiments(with_estimated_noise(
+        machine.experiments, [e.measured - p for e, p in zip(
+            machine.experiments, predicted, strict=True) if p is not None],
+        replace(settings, greatest_level=greatest_level)))
 
 
 def with_estimated_noise(experiments: Sequence[Experiment], residuals: Sequence[FloatArray],
@@ -162,11 +173,3 @@ def _model_error(experiment: Experiment, channel: int, settings: NoiseSettings) 
         return 0.0
     noise = float(np.median(experiment.noise[there, channel]))
     return (experiment.model_error_of(channel, settings.model_error) / noise) ** 2
-
-
-def same_noise(one: Experiment, other: Experiment, settings: NoiseSettings) -> bool:
-    """Return whether the noise of two experiments is as good as the same."""
-    return len(one.colours) == len(other.colours) and all(
-        (a.pole, a.gain) == (b.pole, b.gain)
-        and abs(math.log(a.level / b.level)) < settings.same_level
-        for a, b in zip(one.colours, other.colours, strict=True))

@@ -7,53 +7,54 @@ from typing import Any
 
 import numpy as np
 from simgap.machine.contract import FloatArray
-from simgap.settings import DEFAULT, LackOfFitSettings
+from simgap.settings import DEFAULT, Settings
 
 
-def _clipped(z: FloatArray, settings: LackOfFitSettings) -> FloatArray:
+def _clipped(z: FloatArray, settings: Settings) -> FloatArray:
     # a sample that was read on the other side of an edge is off by any amount
-    bound = settings.clip_fast
+    bound = settings.noise.clip
     return np.asarray(np.clip(z[np.isfinite(z)], -bound, bound))
 
 
-def fast_power(z: FloatArray, settings: LackOfFitSettings = DEFAULT.lack_of_fit) -> float:
+def fast_power(z: FloatArray, settings: Settings = DEFAULT) -> float:
     """Return the variance of the fast part of a residual at even times, shape (n,), clipped."""
     z = _clipped(z, settings)
     return 0.5 * float(np.mean(np.diff(z) ** 2)) if z.size > 1 else 0.0
 
 
-def power(z: FloatArray, settings: LackOfFitSettings = DEFAULT.lack_of_fit) -> float:
+def power(z: FloatArray, settings: Settings = DEFAULT) -> float:
     """Return the mean square of a residual, shape (n,), clipped."""
     z = _clipped(z, settings)
     return float(np.mean(z ** 2)) if z.size else 0.0
 
 
-def slow_excess(z: FloatArray, settings: LackOfFitSettings = DEFAULT.lack_of_fit) -> float:
+def slow_excess(z: FloatArray, settings: Settings = DEFAULT) -> float:
     """Return the power of the slow part of a residual over that of white noise, less one."""
     z = _clipped(z, settings)
-    length = settings.block
+    length = settings.lack_of_fit.block
     count = z.size // length
-    if count < settings.least_blocks or not np.any(z):
+    if count < 4 or not np.any(z):
         return 0.0
     blocks = z[:count * length].reshape(count, length).mean(axis=1)
     return float(length * np.mean(blocks ** 2) / max(fast_power(z, settings), 1e-12) - 1.0)
 
 
-def autocorrelation(z: FloatArray, settings: LackOfFitSettings = DEFAULT.lack_of_fit) -> float:
+def autocorrelation(z: FloatArray, settings: Settings = DEFAULT) -> float:
     """Return the greatest autocorrelation of a residual at the first lags."""
     z = z[np.isfinite(z)] - np.nanmean(z)
     power = float(z @ z)
-    if z.size < 3 * settings.lags or power == 0.0:
+    lags = settings.lack_of_fit.lags
+    if z.size < 3 * lags or power == 0.0:
         return 0.0
-    return float(max(abs(z[lag:] @ z[:-lag]) / power for lag in range(1, settings.lags)))
+    return float(max(abs(z[lag:] @ z[:-lag]) / power for lag in range(1, lags)))
 
 
 def dependence(z: FloatArray, by: FloatArray,
-               settings: LackOfFitSettings = DEFAULT.lack_of_fit) -> float:
+               settings: Settings = DEFAULT) -> float:
     """Return the share of a residual's variance that a covariate explains, chance subtracted."""
     good = np.isfinite(z) & np.isfinite(by)
     z, by = z[good], by[good]
-    bins = settings.bins
+    bins = settings.lack_of_fit.bins
     if z.size < 10 * bins or np.ptp(by) == 0.0:
         return 0.0
     edges = np.unique(np.quantile(by, np.linspace(0.0, 1.0, bins + 1)))
@@ -70,13 +71,13 @@ def dependence(z: FloatArray, by: FloatArray,
 
 def dependences(channels: Sequence[str], covariates: Sequence[Mapping[str, FloatArray]],
                 residuals: Sequence[FloatArray],
-                settings: LackOfFitSettings = DEFAULT.lack_of_fit) -> list[dict[str, Any]]:
+                settings: Settings = DEFAULT) -> list[dict[str, Any]]:
     """Return what residuals, shape (n, c), depend on, of covariates, (n,); the strongest first."""
     found = []
     for c, channel in enumerate(channels):
         z = np.concatenate([r[:, c] for r in residuals])
         for name in covariates[0]:
             share = dependence(z, np.concatenate([each[name] for each in covariates]), settings)
-            if share > settings.least_dependence:
+            if share > settings.lack_of_fit.least_dependence:
                 found.append({'signal': channel, 'depends_on': name, 'share': share})
-    return sorted(found, key=lambda item: -float(str(item['share'])))[:settings.dependences]
+    return sorted(found, key=lambda item: -float(str(item['share'])))

@@ -13,6 +13,14 @@ def robust_weight(residual: FloatArray, valid: NDArray[np.bool_], outlier: float
     return np.asarray(np.where(valid, (outlier / size) ** 2, 0.0))
 
 
+def robust_level(residual: FloatArray, outlier: float) -> float:
+    """Return the rms of residuals that are clipped at so many times itself."""
+    z, level = np.abs(residual), np.inf
+    for _ in range(11):
+        level = float(np.sqrt(np.mean(np.minimum(z, outlier * level) ** 2)))
+    return level
+
+
 def robust_loss(residual: FloatArray, outlier: float) -> float:
     """Return the sum of losses: half the square of small residuals, logarithmic in large ones."""
     # after a contact that is made too late everything differs for a while

@@ -3,51 +3,20 @@
 """Where a fit begins and goes on past minima that derivatives do not lead out of."""
 
 from collections.abc import Sequence
-import math
 
 import numpy as np
 from simgap.fit.least_squares import LeastSquares
 from simgap.fit.state import FitState
-from simgap.machine.contract import Point
-from simgap.settings import SearchSettings
 
 
-def settled(problem: LeastSquares, state: FitState, options: SearchSettings, passes: int,
-            iterations: int) -> FitState:
+def settled(problem: LeastSquares, state: FitState, passes: int) -> FitState:
     """Go on with a fit while fresh derivatives, `passes` at most, gain much."""
+    options = problem.settings.search
     for _ in range(passes):
         before = state.cost
-        state = problem.fit(problem.refreshed(state), iterations)
-        if before - state.cost < max(options.settled, options.final_gain * before):
+        state = problem.fit(problem.refreshed(state), options.iterations)
+        if before - state.cost < options.settled * before:
             break
-    return state
-
-
-def led(problem: LeastSquares, state: FitState, options: SearchSettings) -> FitState:
-    """
-    Return a fit that was led out of a local minimum, or the given one if that gains nothing.
-
-    Where motors stick and slip, a slow test holds the fit in one of many minima. The test that
-    fits best, alone, leads all to its optimum. If another one then fits best, it leads in turn.
-    """
-    def fitted(part: LeastSquares, point: Point, target: float = math.inf) -> FitState:
-        begun = part.start(state.parameters, with_initial_conditions(part, dict(point)))
-        found = part.fit(begun, options.settling_iterations)
-        if found.cost >= target:
-            return found
-        return settled(part, found, options, options.final_passes, options.settling_iterations)
-
-    led_by: set[int] = set()
-    while len(led_by) < len(problem.experiments) > 1:
-        leader = problem.best_fitted(state)
-        if leader in led_by:
-            break
-        led_by.add(leader)
-        ahead = fitted(problem.of_experiment(leader), state.point())
-        found = fitted(problem, ahead.point(), state.cost)
-        if found.cost > (1.0 - options.first_gain) * state.cost:
-            break
-        state = found
     return state
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from simgap.fit.broyden import Jacobian, updated, weighted_product
+from simgap.fit.broyden import Jacobian, updated, updated_product
 from simgap.machine.contract import FloatArray, Parameter
 
 
@@ -43,13 +43,13 @@ class FitState:
         """Return the Gauss-Newton Hessian without the priors, shape (m, m)."""
         if self.kept_hessian is not None:
             return self.kept_hessian
-        return weighted_product(self.jacobian, self.weight)
+        return updated_product(self.base_jacobian, self.broyden_errors,
+                               self.broyden_directions, self.weight)
 
-    def without_jacobian(self, keep_hessian: bool = False) -> FitState:
+    def without_jacobian(self) -> FitState:
         """Return the state without its Jacobian, which takes most of the memory."""
         return FitState(self.parameters, self.x, self.residual, np.empty((0, 0), np.float32),
-                        self.weight, self.cost,
-                        kept_hessian=self.hessian if keep_hessian else None)
+                        self.weight, self.cost, kept_hessian=self.hessian)
 
     def point(self) -> dict[str, float]:
         """Return the values by name."""

@@ -2,7 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """A map from somebody else's file to signals, see docs/recording.md: columns, units, clocks."""
 
-from collections.abc import Mapping
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 import math
 from pathlib import Path
@@ -14,7 +16,7 @@ from simgap.inputs.plain_yaml import read_yaml
 from simgap.inputs.schema import Entry, mapping_of, nearest, ParameterError, quoted
 from simgap.logs.channel import check_name, NANOSECONDS, nanoseconds, RecordingError
 from simgap.logs.expression import Expression, MOST_COLUMNS, parse_expression, Reference
-from simgap.logs.tables import Layout
+from simgap.logs.table import AUTO, Layout
 
 # A unit in which a column may be written: the SI unit and how much of it one is.
 UNITS: dict[str, tuple[str, float]] = {
@@ -31,15 +33,17 @@ UNITS: dict[str, tuple[str, float]] = {
 COUNTS = 'counts'
 TIME_UNITS = {'s': NANOSECONDS, 'ms': 1_000_000, 'us': 1_000, 'ns': 1}
 ISO_8601 = 'iso8601'
-_TEXT_ENTRIES = ('delimiter', 'decimal', 'comment', 'encoding')
-_TOP = (*_TEXT_ENTRIES, 'skip_lines', 'header', 'units_row', 'missing', 'time', 'signals')
-_TIME = ('column', 'unit', 'offset_s', 'origin', 'duplicates')
+_TEXT_ENTRIES = ('delimiter', 'decimal', 'comment', 'encoding', 'records')
+_FLAGS = {'header': True, 'units_row': False, 'transposed': False}
+_TOP = (*_TEXT_ENTRIES, *_FLAGS, 'skip_lines', 'missing', 'where', 'time', 'signals', 'also')
+_TIME = ('column', 'index', 'unit', 'offset_s', 'origin', 'duplicates', 'onto')
 _PLACE = Entry('1', 0, MOST_COLUMNS, whole=True)
 _NUMBERS = {'scale': Entry('1', -1e12, 1e12), 'offset': Entry(''),
             'clock_offset_s': Entry('s', -9e9, 9e9),
-            'counts_per_revolution': Entry('1', 1.0, 2.0**64)}
+            'counts_per_revolution': Entry('1', 1.0, 2.0**64), 'unwrap': Entry('', 0.0)}
 _WHOLE_NUMBERS = {'index': _PLACE, 'sign_magnitude_bits': Entry('1', 2, 53, whole=True)}
-_SIGNAL = ('column', 'expression', 'unit', 'sign', 'time_column', *_NUMBERS, *_WHOLE_NUMBERS)
+_SIGNAL = ('column', 'expression', 'unit', 'sign', 'time_column', 'join', *_NUMBERS,
+           *_WHOLE_NUMBERS)
 _SKIP_LINES = Entry('1', 0, 10000, whole=True)
 
 
@@ -47,11 +51,13 @@ _SKIP_LINES = Entry('1', 0, 10000, whole=True)
 class TimeMap:
     """How the time is written."""
 
-    column: str | int  # its name, or its place, counted from 0
+    column: str | int = AUTO  # its name, or its place, counted from 0
+    index: int | None = None  # of the time in a column of vectors
     unit: str = 's'  # one of TIME_UNITS, or iso8601 (without a zone it is taken for UTC)
     offset_ns: int = 0  # added to every time stamp [ns]
     from_first: bool = False  # count from the first time stamp of the file
     duplicates: str = 'refuse'  # or first or last: which of the rows with one stamp counts
+    onto: str = ''  # the signal onto whose stamps others come; '' for one with the most samples
 
 
 @dataclass(frozen=True)
@@ -66,6 +72,10 @@ class SignalMap:
     time_column: str | int | None = None  # of its own stamps; None for the common one
     clock_offset_ns: int = 0  # added to this signal's time stamps [ns]
     sign_bit: int = 0  # value of the bit that is the sign of a sign-magnitude register; 0 for none
+    unwrap: float = 0.0  # what the number jumps by where it wraps around; 0 if it does not
+    # onto the stamps of another clock: a sample goes to the next stamp, as what is held does, or
+    # along a straight line to the nearest one
+    join: str = 'next'
 
 
 @dataclass(frozen=True)
@@ -76,6 +86,10 @@ class ImportMap:
     signals: Mapping[str, SignalMap]
     layout: Layout = Layout()
     source: Mapping[str, Any] = field(default_factory=dict)
+    where: Mapping[str, Any] = field(default_factory=dict)  # values that the rows must have
+    # maps of further files of the same test, by their names; {test} is what comes before the last
+    # underscore in the name of the first
+    also: Mapping[str, ImportMap] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -117,7 +131,7 @@ def parse_map(tree: object, known: KnownSignals = NO_SIGNALS) -> ImportMap:
                              'Python knows, such as utf-8 or latin-1') from None
     skip = int(_SKIP_LINES.check('skip_lines', plain_value(  # type: ignore[arg-type]
         top.get('skip_lines', 0))))
-    rows = {'header': top.get('header', True), 'units_row': top.get('units_row', False)}
+    rows = {key: top.get(key, usual) for key, usual in _FLAGS.items()}
     for key, value in rows.items():
         if not isinstance(value, bool):
             raise ParameterError(f'{key}: {quoted(plain_value(value))} given, allowed is true or '
@@ -135,9 +149,23 @@ def parse_map(tree: object, known: KnownSignals = NO_SIGNALS) -> ImportMap:
         signals[signal] = _signal(f'signals.{one_line(name)}', signal, body, known)
     if not signals:
         raise ParameterError('signals: none is given')
-    return ImportMap(_time(top.get('time')), signals,
+    return ImportMap(_time(top.get('time', {'column': AUTO})), signals,
                      Layout(**texts, **rows,  # type: ignore[arg-type]
-                            skip_lines=skip, missing=tuple(missing)), top)
+                            skip_lines=skip, missing=tuple(missing)), top,
+                     mapping_of('where', top.get('where', {})),
+                     _also(top.get('also', {}), known, signals))
+
+
+def _also(body: object, known: KnownSignals, taken: Collection[str]) -> dict[str, ImportMap]:
+    found: dict[str, ImportMap] = {}
+    for name, entries in mapping_of('also', body).items():
+        try:
+            found[name] = parse_map(entries, known)
+        except ParameterError as error:
+            raise ParameterError(f'also.{one_line(name)}: {error}') from None
+        for signal in set(taken) & found[name].signals.keys():
+            raise ParameterError(f'also.{one_line(name)}: signals.{signal} is given twice')
+    return found
 
 
 def _text(key: str, value: object, choices: tuple[str, ...] | None = None) -> str:
@@ -161,10 +189,12 @@ def _time(body: object) -> TimeMap:
     entries = mapping_of('time', body, _TIME)
     return TimeMap(
         _column('time.column', entries.get('column')),
+        _whole('time', 'index', entries),
         _text('time.unit', entries.get('unit', 's'), (*TIME_UNITS, ISO_8601)),
         nanoseconds(_number('time.offset_s', entries.get('offset_s', 0), 'clock_offset_s')),
         _text('time.origin', entries.get('origin', 'keep'), ('keep', 'first')) == 'first',
-        _text('time.duplicates', entries.get('duplicates', 'refuse'), ('refuse', 'first', 'last')))
+        _text('time.duplicates', entries.get('duplicates', 'refuse'), ('refuse', 'first', 'last')),
+        _text('time.onto', entries['onto']) if 'onto' in entries else '')
 
 
 def _number(key: str, value: object, entry: str) -> float:
@@ -210,7 +240,9 @@ def _signal(key: str, name: str, body: object, known: KnownSignals) -> SignalMap
         float(sign) * numbers.get('scale', 1.0), numbers.get('offset', 0.0),
         None if own_time is None else _column(f'{key}.time_column', own_time),
         nanoseconds(numbers.get('clock_offset_s', 0.0)),
-        (1 << (_whole(key, 'sign_magnitude_bits', entries) or 0)) >> 1)
+        (1 << (_whole(key, 'sign_magnitude_bits', entries) or 0)) >> 1,
+        numbers.get('unwrap', 0.0),
+        _text(f'{key}.join', entries.get('join', 'next'), ('next', 'linear')))
 
 
 def _expression(key: str, entries: Mapping[str, Any]) -> Expression:

@@ -11,7 +11,7 @@ vectors, `column('T (ms)')` a column of that name, and `column(0)` the first col
 from __future__ import annotations
 
 import ast
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 import math
@@ -66,6 +66,16 @@ class Expression:
     def of_column(cls, reference: Reference) -> Expression:
         """Return a column as it is."""
         return cls((reference,), operator.itemgetter(0))
+
+    def bound(self, constants: Mapping[str, float]) -> Expression:
+        """Return the expression with constants in the place of columns of their names."""
+        left = tuple(column for column in self.references if str(column) not in constants)
+        if not left or left == self.references:
+            return self
+        places = {column: k for k, column in enumerate(left)}
+        return Expression(left, lambda numbers: self.value([
+            numbers[places[column]] if column in places else constants[str(column)]
+            for column in self.references]))
 
 
 def parse_expression(key: str, text: str) -> Expression:

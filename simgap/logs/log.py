@@ -19,14 +19,15 @@ from simgap.inputs.labels import parse_labels, plain_value
 from simgap.inputs.limits import SAMPLES
 from simgap.inputs.plain_yaml import read_yaml
 from simgap.inputs.schema import Entry, mapping_of, nearest, ParameterError
-from simgap.logs.channel import NANOSECONDS, RecordingError
+from simgap.logs.bags import REMEDY
+from simgap.logs.channel import Channel, IntArray, NANOSECONDS, RecordingError
 from simgap.logs.column_map import ImportMap, load_map
-from simgap.logs.mapped import read_mapped
-from simgap.logs.tables import open_table, Text
-from simgap.logs.text import Cell, parse_number
+from simgap.logs.mapped import read_file
+from simgap.logs.table import Text, TIMES
+from simgap.logs.tables import open_table
+from simgap.logs.text import Cell, LATEST_S, parse_number
 from simgap.machine.contract import FloatArray
 
-_TIME = ('time_s', 'time', 't')
 _LEAST_SAMPLES = 2
 _CONSTANT = Entry('')
 # A command is known in a gap where the rates before and after it tell the way across it up to this
@@ -127,10 +128,10 @@ def read_log(path: str | Path, import_map: ImportMap | None = None) -> Log:
     import_map : which column is which, and how it is written
     """
     path = Path(path)
-    time, columns = _mapped(path, import_map) if import_map else _plain(path)
     constants, labels = _sheet(path.with_suffix('.yaml'))
+    time, columns, told = (_mapped(path, import_map, constants) if import_map else _plain(path))
     try:
-        return Log(path.stem, time, columns, constants, labels)
+        return Log(path.stem, time, columns, {**told, **constants}, labels)
     except LogError as error:
         raise LogError(f'{path}: {str(error).partition(": ")[2]}') from None
 
@@ -146,9 +147,11 @@ def read_logs(paths: Sequence[str | Path], map_path: str | Path | None = None) -
     return logs
 
 
-def _plain(path: Path) -> tuple[FloatArray, dict[str, FloatArray]]:
+def _plain(path: Path) -> tuple[FloatArray, dict[str, FloatArray], Mapping[str, float]]:
     with open_table(path) as table:
         names = list(table.names)
+        if not names:
+            raise LogError(f'{path}: no column is read without a map. {REMEDY}')
         if len(set(names)) < len(names):
             raise LogError(f'{path}: {table.start}' + (
                 'a column is there twice' if any(names) else
@@ -168,8 +171,9 @@ def _plain(path: Path) -> tuple[FloatArray, dict[str, FloatArray]]:
                     if table.is_text:
                         raise
                     del cells[name]  # a column of another kind beside the numbers
-    return _with_time(path, {name: np.array(cells.pop(name)[:table.lengths.get(name)])
-                             for name in list(cells)})
+    time, columns = _with_time(path, {
+        name: np.array(cells.pop(name)[:table.lengths.get(name)]) for name in list(cells)})
+    return time, columns, table.constants
 
 
 def _number(given: Text, cell: Cell) -> float:
@@ -182,28 +186,59 @@ def _number(given: Text, cell: Cell) -> float:
 
 def _with_time(path: Path, columns: dict[str, FloatArray],
                ) -> tuple[FloatArray, dict[str, FloatArray]]:
-    time = next((name for name in _TIME if name in columns), '')
+    time = next((name for name in TIMES if name in columns), '')
     if not time:
-        raise LogError(f'{path}: no column {" or ".join(_TIME)}; with --map another column '
+        raise LogError(f'{path}: no column {" or ".join(TIMES)}; with --map another column '
                        'is the time')
+    if np.nanmax(np.abs(columns[time]), initial=0.0) > LATEST_S:
+        raise LogError(f'{path}: {time} is beyond {LATEST_S:g} s; a map says in which unit it is')
     return columns.pop(time), columns
 
 
-def _mapped(path: Path, import_map: ImportMap) -> tuple[FloatArray, dict[str, FloatArray]]:
-    """Read a file with a map; of several clocks that with most samples gives the times."""
-    channels = read_mapped(path, import_map)
-    every = list({id(c.time_ns): c.time_ns for c in channels.values()}.values())  # mostly one
-    one_clock = len({(s.time_column, s.clock_offset_ns) for s in import_map.signals.values()}) == 1
-    stamps = np.unique(np.concatenate(every)) if one_clock else max(every, key=len)
+def _mapped(path: Path, import_map: ImportMap, constants: Mapping[str, float],
+            ) -> tuple[FloatArray, dict[str, FloatArray], Mapping[str, float]]:
+    """Read a file with a map; of several clocks one gives the times."""
+    file = read_file(path, import_map, constants)
+    stamps_of: dict[object, list[IntArray]] = {}
+    for name, channel in file.channels.items():
+        stamps_of.setdefault(file.clocks[name][0], []).append(channel.time_ns)
+    every = {clock: np.unique(np.concatenate(list({id(part): part for part in parts}.values())))
+             for clock, parts in stamps_of.items()}
+    onto = import_map.time.onto
+    if onto and onto not in file.clocks:
+        raise LogError(f'{path}: time.onto: the map has no signal {onto}'
+                       f'{nearest(onto, file.clocks)}')
+    main = file.clocks[onto][0] if onto else max(every, key=lambda clock: len(every[clock]))
+    stamps = every[main]
     if len(stamps) < _LEAST_SAMPLES:
         raise LogError(f'{path}: fewer than {_LEAST_SAMPLES} samples')
     columns = {}
-    for name in list(channels):
-        channel = channels.pop(name)
-        columns[name] = np.full(len(stamps), np.nan)
+    for name, channel in file.channels.items():
+        if not len(channel):
+            raise LogError(f'{path}: {name}: no sample; take the signal out of the map')
+        if channel.time_ns[0] > stamps[-1] or channel.time_ns[-1] < stamps[0]:
+            raise LogError(f'{path}: {name}: its time has no part in common with the others; '
+                           'clock_offset_s moves a signal, origin: first counts a file from its '
+                           'first stamp, and time: {column: log_time} takes one clock for a bag')
+        clock, join = file.clocks[name]
+        columns[name] = _joined(channel, stamps, 'next' if clock == main else join)
+    return stamps / NANOSECONDS, columns, file.constants
+
+
+def _joined(channel: Channel, stamps: IntArray, join: str) -> FloatArray:
+    """Return a channel at the stamps of another clock, NaN where it has no sample there."""
+    column = np.full(len(stamps), np.nan)
+    if join == 'next':
         place = np.searchsorted(stamps, channel.time_ns)
-        columns[name][np.minimum(place, len(stamps) - 1)] = channel.values
-    return stamps / NANOSECONDS, columns
+        column[place[place < len(stamps)]] = channel.values[place < len(stamps)]
+        return column
+    # each sample counts once, at the nearest stamp, or noise would be in the log many times
+    middles = stamps[:-1] + np.diff(stamps) // 2
+    nearest = np.unique(np.searchsorted(middles, channel.time_ns))
+    inside = (stamps >= channel.time_ns[0]) & (stamps <= channel.time_ns[-1])
+    nearest = nearest[inside[nearest]]
+    column[nearest] = channel.at(stamps[nearest])
+    return column
 
 
 def _sheet(path: Path) -> tuple[dict[str, float], dict[str, str]]:

@@ -6,21 +6,23 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from datetime import datetime, timedelta, timezone
 import math
 from pathlib import Path
 import re
+from typing import Any
 import warnings
 
 import numpy as np
 from simgap.errors import one_line
 from simgap.inputs.limits import SAMPLES
-from simgap.inputs.schema import nearest
 from simgap.logs.channel import Channel, make_channel, RecordingError, RecordingWarning
 from simgap.logs.column_map import ImportMap, ISO_8601, SignalMap, TIME_UNITS
 from simgap.logs.expression import Reference
-from simgap.logs.tables import Layout, open_table, Table, Text
+from simgap.logs.fields import Stamp
+from simgap.logs.table import Layout, Table, Text
+from simgap.logs.tables import open_table
 from simgap.logs.text import Cell, parse_nanoseconds, parse_number
 
 _EPOCH = datetime(1970, 1, 1, tzinfo=timezone.utc)
@@ -29,30 +31,60 @@ _BETWEEN = re.compile(r'[\s,;]+')
 _BETWEEN_DECIMAL_COMMAS = re.compile(r'[\s;]+')
 
 
-def read_mapped(path: str | Path, import_map: ImportMap) -> dict[str, Channel]:
-    """
-    Return the signals that a map finds in a file, by name.
+@dataclass(frozen=True)
+class MappedFile:
+    """What a map finds in a file, and in others of the same test."""
 
-    RecordingError names file, line and column of what the map does not allow. Warns if the
-    last line is not ended, or repeated rows were left out.
+    channels: Mapping[str, Channel]  # by the name of the signal
+    # equal for signals whose stamps are those of one clock; and how each comes onto another
+    clocks: Mapping[str, tuple[object, str]]
+    constants: Mapping[str, float]  # that the file tells beside its table
+
+
+def read_mapped(path: str | Path, import_map: ImportMap) -> dict[str, Channel]:
+    """Return the signals that a map finds in a file, by name; errors as of `read_file`."""
+    return dict(read_file(path, import_map).channels)
+
+
+def read_file(path: str | Path, import_map: ImportMap,
+              constants: Mapping[str, float] | None = None) -> MappedFile:
+    """
+    Return what a map finds in a file and beside it; constants are what expressions may name.
+
+    RecordingError names file, line and column of what the map does not allow. Warns if the last
+    line is not ended, or repeated rows were left out.
     """
     path = Path(path)
+    found = _one_file(path, import_map, constants or {})
+    for name, other_map in import_map.also.items():
+        test = path.stem.rpartition('_')[0] or path.stem
+        other = read_file(path.with_name(name.replace('{test}', test)), other_map, constants)
+        found = MappedFile({**found.channels, **other.channels}, {**found.clocks, **other.clocks},
+                           {**other.constants, **found.constants})
+    return found
+
+
+def _one_file(path: Path, import_map: ImportMap, constants: Mapping[str, float]) -> MappedFile:
     room = SAMPLES.value()
     with open_table(path, import_map.layout) as table:
         if not table.is_text:  # a number is a number there, whatever text would look like
             import_map = replace(import_map, layout=Layout())
-        place = _places(path, table, import_map)
-        clocks = {column: _Clock(path, str(column), table.counted, import_map)
-                  for column in {_clock_of(signal, import_map)
-                                 for signal in import_map.signals.values()}}
-        signals = [_Samples(path, signal, _clock_of(signal, import_map), place, table.counted,
+        known = {name: value for name, value in {**table.constants, **constants}.items()
+                 if name not in table.names}
+        signals = [_Samples(path, replace(signal, number=signal.number.bound(known)), table,
                             import_map) for signal in import_map.signals.values()]
+        clocks = {samples.clock: _Clock(path, samples.clock, table, import_map)
+                  for samples in signals}
+        _check_lengths(table, signals)
+        conditions = [(*table.place(column), value) for column, value in import_map.where.items()]
         for line, row in table.rows:
+            if conditions and not all(_holds(row[place], k, value)
+                                      for place, k, value in conditions):
+                continue
             room -= len(signals)
             if room < 0:
                 raise RecordingError(f'{path}: {table.counted} {line}: {SAMPLES.exceeded()}')
-            stamps = {column: clock.read(line, row[place[column]])
-                      for column, clock in clocks.items()}
+            stamps = {column: clock.read(line, row) for column, clock in clocks.items()}
             for samples in signals:
                 samples.read(line, row, stamps)
     dropped = sum(clock.repeated for clock in clocks.values())
@@ -60,52 +92,86 @@ def read_mapped(path: str | Path, import_map: ImportMap) -> dict[str, Channel]:
         warnings.warn(f'{path}: {dropped} time stamps are repeated; the '
                       f'{import_map.time.duplicates} row of each counts', RecordingWarning,
                       stacklevel=2)
-    first = min((s.stamps[0] for s in signals if s.stamps), default=0)
+    return MappedFile(_channels(import_map, signals), {
+        name: ((path, samples.clock, signal.clock_offset_ns), signal.join)
+        for (name, signal), samples in zip(import_map.signals.items(), signals, strict=True)
+    }, table.constants)
+
+
+def _channels(import_map: ImportMap, signals: list[_Samples]) -> dict[str, Channel]:
+    """Return the samples as channels, which share the times that are the same."""
+    first = min((int(s.stamps[0]) for s in signals if s.stamps), default=0)
     origin = first if import_map.time.from_first else 0
     channels: dict[str, Channel] = {}
     shared = np.empty(0, np.int64)
-    for name, signal in import_map.signals.items():
-        samples = signals.pop(0)  # ten million rows are in memory once
+    for (name, signal), samples in zip(import_map.signals.items(), signals, strict=True):
         times = np.array(samples.stamps, np.int64) - origin
         if not np.array_equal(times, shared):
             shared = times
             shared.flags.writeable = False  # or each channel would have a copy
-        channels[name] = make_channel(name, signal.unit, shared, samples.values)
+        values: Any = samples.values
+        if signal.unwrap:
+            values = np.unwrap(np.array(values), period=signal.factor * abs(signal.gain)
+                               * signal.unwrap)
+        channels[name] = make_channel(name, signal.unit, shared, values)
+        samples.values, samples.stamps = array('d'), array('q')  # ten million rows are held once
     return channels
 
 
-def _clock_of(signal: SignalMap, import_map: ImportMap) -> str | int:
-    return import_map.time.column if signal.time_column is None else signal.time_column
+def _holds(given: Text, index: int | None, wanted: object) -> bool:
+    """Tell whether a cell has a value, as a number or as a text."""
+    text = given if isinstance(given, str) else given[index or 0]
+    try:
+        return float(text) == float(wanted)  # type: ignore[arg-type]
+    except ValueError:
+        return text == wanted
+
+
+def _check_lengths(table: Table, signals: Sequence[_Samples]) -> None:
+    for samples in signals:
+        lengths = {name: table.lengths[name] for place in samples.places
+                   if (name := table.names[place]) in table.lengths}
+        if len(set(lengths.values())) > 1:
+            raise RecordingError(' and '.join(
+                f'{one_line(column, 60)} has {length} values'
+                for column, length in lengths.items()) + '; a signal needs one for each time; '
+                'transposed: true in a map turns tables that lie on their side')
 
 
 class _Samples:
     """Collects the samples of one signal."""
 
-    def __init__(self, path: Path, signal: SignalMap, clock: str | int,
-                 place: Mapping[str | int, int], counted: str, import_map: ImportMap) -> None:
+    def __init__(self, path: Path, signal: SignalMap, table: Table, import_map: ImportMap) -> None:
         self.stamps, self.values = array('q'), array('d')
-        self._path, self._signal, self._clock, self._counted = path, signal, clock, counted
-        self._places = [(reference, place[reference.column])
-                        for reference in signal.number.references]
+        self.name = ' and '.join(map(str, signal.number.references))
+        self._path, self._signal, self._counted = path, signal, table.counted
+        self.clock = table.clock(signal.number.references[0].column, import_map.time.column
+                                 if signal.time_column is None else signal.time_column)
+        self.places = [table.place(self.clock)[0]]
+        self._parts: list[tuple[Reference, int]] = []
+        for reference in signal.number.references:
+            place, index = table.place(reference.column)
+            self.places.append(place)
+            self._parts.append((reference if index is None else replace(reference, index=index),
+                                place))
         self._decimal, self._duplicates = import_map.layout.decimal, import_map.time.duplicates
-        self._name = ' and '.join(map(str, signal.number.references))
 
     def read(self, line: int, row: Sequence[Text], stamps: Mapping[str | int, int | None]) -> None:
         """Take the sample of a row, if it has one."""
         signal = self._signal
         numbers = []
-        for reference, place in self._places:
+        for reference, place in self._parts:
             cell = Cell(self._path, line, str(reference), self._counted)
             text = _element(row[place], reference, cell, self._decimal)
             if not text:
                 return
             numbers.append(_number_of(text, cell, self._decimal, signal.sign_bit))
-        cell = Cell(self._path, line, self._name, self._counted)
+        cell = Cell(self._path, line, self.name, self._counted)
         try:
             number = signal.number.value(numbers)
         except (ArithmeticError, ValueError) as error:
             raise cell.refuse(f'the expression has no value, {one_line(error)}') from None
-        stamp = stamps[self._clock]
+        stamp = stamps[self.clock]
         if stamp is None:
             raise cell.refuse('there is a value, but no time stamp')
         value = signal.factor * (signal.gain * number + signal.offset)
@@ -163,58 +229,27 @@ def _append(stamps: array[int], values: array[float], stamp: int, value: float, 
     values.append(value)
 
 
-def _places(path: Path, table: Table, import_map: ImportMap) -> dict[str | int, int]:
-    """Return where each column that the map names lies in a row."""
-    found: dict[str | int, int] = {}
-    for signal in import_map.signals.values():
-        clock = _clock_of(signal, import_map)
-        together = {column: _place(path, table, column) for column in (
-            clock, *(reference.column for reference in signal.number.references))}
-        lengths = {column: table.lengths[name] for column, place in together.items()
-                   if (name := table.names[place]) in table.lengths}
-        if len(set(lengths.values())) > 1:
-            raise RecordingError(f'{path}: ' + ' and '.join(
-                f'{one_line(column, 60)} has {length} values'
-                for column, length in lengths.items()) + '; a signal needs one for each time')
-        found.update(together)
-    return found
-
-
-def _place(path: Path, table: Table, column: str | int) -> int:
-    names, where = table.names, f'{path}: {table.start}'
-    if isinstance(column, int):
-        if column >= len(names):
-            raise RecordingError(f'{where}there is no column number {column}, counted from 0; '
-                                 f'there are {len(names)}')
-        return column
-    if not any(names):
-        raise RecordingError(f'{where}the column {one_line(repr(column), 60)} is not there: the '
-                             'columns have no names; give their numbers, counted from 0')
-    if names.count(column) != 1:  # type: ignore[attr-defined]
-        what = 'is there twice' if column in names else (
-            f'is not there{one_line(nearest(column, names))}')
-        raise RecordingError(f'{where}the column {one_line(repr(column), 60)} {what}')
-    return names.index(column)
-
-
 class _Clock:
     """Reads one column of time stamps, and checks that they rise."""
 
-    def __init__(self, path: Path, column: str, counted: str, import_map: ImportMap) -> None:
+    def __init__(self, path: Path, column: str | int, table: Table, import_map: ImportMap) -> None:
         self.repeated = 0
-        self._path, self._column, self._counted = path, column, counted
+        self._place, index = table.place(column)
         self._time, self._decimal = import_map.time, import_map.layout.decimal
+        self._reference = Reference(column, self._time.index if index is None else index)
+        self._path, self._counted = path, table.counted
         self._previous: int | None = None
 
-    def read(self, line: int, given: Text) -> int | None:
-        """Return a time stamp [ns], None for an empty cell."""
-        cell = Cell(self._path, line, self._column, self._counted)
-        if isinstance(given, list):
-            raise cell.refuse('a vector, allowed is a time')
-        text = given.strip()
+    def read(self, line: int, row: Sequence[Text]) -> int | None:
+        """Return the time stamp of a row [ns], None if it has none."""
+        cell = Cell(self._path, line, str(self._reference), self._counted)
+        given = row[self._place]
+        text = _element(given, self._reference, cell, self._decimal)
         if not text:
             return None
-        if self._time.unit == ISO_8601:
+        if isinstance(given, Stamp):
+            stamp = parse_nanoseconds(text, cell)
+        elif self._time.unit == ISO_8601:
             stamp = _iso_8601(text, cell)
         else:
             stamp = parse_nanoseconds(_point(text, self._decimal), cell,

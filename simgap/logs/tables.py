@@ -1,76 +1,43 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""
-Tables as they come: text, .npy, .npz, .mat, JSON, JSON lines and Parquet, as rows of cells.
+"""Opens a file of any kind as a table: its kind is known by what it holds, else by its name."""
 
-Cells are texts, empty without a sample, or vectors of texts. A number becomes the shortest text
-that is read back to its last bit, so a file means the same whatever its kind.
-"""
-
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
-from datetime import datetime
 import itertools
 from pathlib import Path
 from tokenize import TokenError
 from typing import Any
-from zipfile import BadZipFile, ZipFile
+from zipfile import BadZipFile
 import zlib
 
-import numpy as np
 from simgap.errors import one_line
-from simgap.inputs.limits import CSV_LINE, SAMPLES, SIGNALS
-from simgap.inputs.plain import from_json, PlainDataError
+from simgap.inputs.limits import CSV_LINE, SIGNALS
+from simgap.inputs.plain import PlainDataError
+from simgap.logs.bags import BagTable
 from simgap.logs.channel import RecordingError
+from simgap.logs.files import (
+    arrays, read_json, read_json_lines, read_npy, read_npz, read_parquet,
+)
 from simgap.logs.mat import read_mat
-from simgap.logs.text import open_text, read_text, rows
+from simgap.logs.table import Layout, Table
+from simgap.logs.text import open_text, rows
 
-# A cell: a text that may be a number, or a vector of such texts.
-Text = str | list[str]
-_BLOCK = 4096   # rows that are turned into cells at a time
 # what the libraries raise where a file is damaged
 _DAMAGE = (ValueError, TypeError, BadZipFile, EOFError, zlib.error, ArithmeticError, LookupError,
            AttributeError, RuntimeError, SyntaxError, TokenError)
 
 
-@dataclass(frozen=True)
-class Layout:
-    """How text is laid out; other kinds of files need no such help."""
-
-    delimiter: str = ''  # between cells; '' for the one that the header has
-    decimal: str = '.'  # in numbers
-    comment: str = ''  # rows that begin with it are left out; '' for none
-    encoding: str = 'utf-8-sig'
-    skip_lines: int = 0  # lines before the header
-    header: bool = True  # False if the columns have no names
-    units_row: bool = False  # whether a row behind the header is left out
-    missing: tuple[str, ...] = ()  # cells that hold no sample, such as NaN
-
-
-@dataclass(frozen=True)
-class Table:
-    """An open file."""
-
-    names: Sequence[str]  # of the columns; empty texts where they have none
-    rows: Iterator[tuple[int, Sequence[Text]]]  # with the number of each one's line
-    start: str = ''  # where the names stand, for errors
-    counted: str = 'row'  # what the number of a row counts
-    # of columns that need not be equally long
-    lengths: Mapping[str, int] = field(default_factory=dict)
-    is_text: bool = False  # whether a cell that is not a number is a mistake
-
-
 @contextmanager
 def open_table(path: Path, layout: Layout = Layout()) -> Iterator[Table]:
-    """Open a file by its suffix, else as text; RecordingError if it is damaged or too large."""
-    reader = _READERS.get(path.suffix.lower())
-    if reader is None:
-        with open_text(path, layout.encoding) as stream:
-            yield _text_table(path, stream, layout)
-        return
+    """Open a file as its kind is opened; RecordingError if it is damaged or too large."""
     try:
-        table = reader(path)
+        kind = kind_of(path)
+        if not kind:
+            with open_text(path, layout.encoding) as stream:
+                yield _text_table(path, stream, layout)
+            return
+        table = _refusing(path, _READERS[kind], layout)
         if len(table.names) > SIGNALS.value():
             raise RecordingError(SIGNALS.exceeded())
         yield table
@@ -90,6 +57,12 @@ def _text_table(path: Path, stream: Any, layout: Layout) -> Table:
     table = _text_rows(path, stream, layout)
     line, first = next(table, (layout.skip_lines + 1, []))
     start = f'line {line}: '
+    if layout.transposed:
+        lines = [first, *(row for _, row in table)]
+        skipped = layout.header + layout.units_row
+        return Table([row[0].strip() if layout.header else '' for row in lines],
+                     enumerate(zip(*(row[skipped:] for row in lines), strict=True), 1), '',
+                     'place', is_text=True)
     if layout.units_row:
         next(table, None)
     if layout.header:
@@ -113,187 +86,43 @@ def _text_rows(path: Path, stream: Any, layout: Layout) -> Iterator[tuple[int, l
                                          for cell in row]
 
 
-def _arrays(columns: Mapping[str, Any], names: Sequence[str] | None = None) -> Table:
-    """Return arrays as a table: vectors are columns, shape (n, k) is a column of vectors."""
-    columns = {name: _upright(values) for name, values in columns.items()
-               if values.dtype.kind in 'biuf'}
-    columns = {name: values for name, values in columns.items() if values.ndim in (1, 2)}
-    lengths = {name: len(values) for name, values in columns.items()}
-    return Table(list(columns) if names is None else names, _array_rows(columns), lengths=lengths)
+def _refusing(path: Path, read: Callable[[Path, Layout], Table], layout: Layout) -> Table:
+    """Read a file, and say in a line what a library says of a damaged one."""
+    try:
+        return read(path, layout)
+    except (OSError, RecordingError):
+        raise
+    except MemoryError:
+        raise RecordingError('not enough memory for what the file says it holds') from None
+    except PlainDataError as error:
+        raise RecordingError(str(error)) from None
+    except _DAMAGE as error:
+        raise RecordingError(f'no {path.suffix} that can be read, '
+                             f'{one_line(error) or type(error).__name__}') from None
 
 
-def _upright(values: Any) -> Any:
-    """Return an array without the dimension that MATLAB gives to every vector."""
-    return values.squeeze() if values.ndim == 2 and 1 in values.shape else values
+_READERS: Mapping[str, Callable[[Path, Layout], Table]] = {
+    '.npy': read_npy, '.npz': read_npz, '.json': read_json,
+    '.mat': lambda path, layout: arrays(read_mat(path), layout),
+    '.jsonl': read_json_lines, '.ndjson': read_json_lines, '.parquet': read_parquet,
+    '.pq': read_parquet, '.mcap': lambda path, layout: BagTable(path)}
+# The kind that the first bytes tell, or a remedy; JSON and the oldest .mat have none of their own.
+_STARTS = {
+    b'\x89MCAP0': '.mcap', b'SQLite format 3': '.mcap', b'PAR1': '.parquet', b'\x93NUMPY': '.npy',
+    b'PK\x03\x04': '.npz', b'MATLAB 5.0': '.mat',
+    b'\x28\xb5\x2f\xfd': 'packed as a whole; `zstd -d FILE` unpacks it, and folders need it not',
+    b'#ROSBAG': 'a bag of ROS 1; `rosbags-convert --src FILE --dst FOLDER` makes one of ROS 2',
+    b'\x89HDF': 'a file of HDF5; save it as .npz or .parquet, or with -v7 in MATLAB'}
 
 
-def _array_rows(columns: Mapping[str, Any]) -> Iterator[tuple[int, Sequence[Text]]]:
-    count = max(map(len, columns.values()), default=0)
-    for first in range(0, count, _BLOCK):
-        parts = [[_cell(value) for value in values[first:first + _BLOCK].tolist()]
-                 for values in columns.values()]
-        yield from enumerate(itertools.zip_longest(*parts, fillvalue=''), first + 1)
-
-
-def _npy(path: Path) -> Table:
+def kind_of(path: Path) -> str:
+    """Return the suffix that a file's kind usually has, '' for text; OSError if unreadable."""
+    if path.is_dir():
+        return '.mcap'
     with path.open('rb') as stream:
-        _within(SAMPLES.value() - _npy_header(stream)[0])
-        stream.seek(0)
-        values = np.load(stream, allow_pickle=False)
-    if values.dtype.names:
-        return _arrays({name: values[name] for name in values.dtype.names})
-    table = values[:, np.newaxis] if values.ndim == 1 else values
-    if table.ndim != 2 or table.dtype.kind not in 'biuf':
-        raise RecordingError(f'an array of shape {values.shape} and type {values.dtype}, allowed '
-                             'is a table of numbers, or an array with named columns')
-    columns = {str(j): table[:, j] for j in range(min(table.shape[1], SIGNALS.value() + 1))}
-    return _arrays(columns, [''] * len(columns))
-
-
-def _npz(path: Path) -> Table:
-    wanted, room = [], SAMPLES.value()
-    with ZipFile(path) as archive:
-        for name in archive.namelist():
-            if name.endswith('.npy'):
-                with archive.open(name) as stream:
-                    count, kind = _npy_header(stream)
-                if kind.kind in 'biuf':
-                    wanted.append(name.removesuffix('.npy'))
-                    room -= count
-    _within(room)
-    with np.load(path, allow_pickle=False) as file:
-        return _arrays({name: np.asarray(file[name]) for name in wanted})
-
-
-def _npy_header(stream: Any) -> tuple[int, Any]:
-    """Return how many numbers an array holds, and their type, before anything is unpacked."""
-    version = np.lib.format.read_magic(stream)
-    read = (np.lib.format.read_array_header_1_0 if version == (1, 0)
-            else np.lib.format.read_array_header_2_0)
-    shape, _, kind = read(stream)
-    return int(np.prod(shape, dtype=object)) * max(1, len(kind.names or ())), kind
-
-
-def _within(room: int) -> None:
-    if room < 0:
-        raise RecordingError(SAMPLES.exceeded())
-
-
-def _json(path: Path) -> Table:
-    tree = from_json(read_text(path))
-    if isinstance(tree, dict):
-        columns = {name: values for name, values in tree.items() if isinstance(values, list)}
-        count = max(map(len, columns.values()), default=0)
-        cells = ([_cell(values[k]) if k < len(values) else '' for values in columns.values()]
-                 for k in range(count))
-        return Table(list(columns), enumerate(cells, 1),
-                     lengths={name: len(values) for name, values in columns.items()})
-    if isinstance(tree, list):
-        return _records(enumerate(tree, 1), 'record')
-    raise RecordingError('a single value, allowed is a mapping of columns or a list of records')
-
-
-def _json_lines(path: Path) -> Table:
-    return _records(_parsed_lines(path), 'line')
-
-
-def _parsed_lines(path: Path) -> Iterator[tuple[int, Any]]:
-    longest = CSV_LINE.value()
-    with path.open('rb') as stream:
-        number = 0
-        while line := stream.readline(longest + 1):
-            number += 1
-            if len(line) > longest:
-                raise RecordingError(f'line {number}: {CSV_LINE.exceeded()}')
-            if line.strip():
-                try:
-                    yield number, from_json(line.strip())
-                except PlainDataError as error:
-                    raise RecordingError(f'line {number}: {error}') from None
-
-
-def _records(items: Iterator[tuple[int, Any]], counted: str) -> Table:
-    """Return records as rows; the columns are those of the first, and others may lack some."""
-    number, first = next(items, (1, {}))
-    if not isinstance(first, dict):
-        raise RecordingError(f'{counted} {number}: no mapping from columns to values')
-    names = list(first)
-
-    def cells() -> Iterator[tuple[int, Sequence[Text]]]:
-        for place, record in itertools.chain([(number, first)], items):
-            if not isinstance(record, dict):
-                raise RecordingError(f'{counted} {place}: no mapping from columns to values')
-            yield place, [_cell(record.get(name)) for name in names]
-
-    return Table(names, cells(), counted=counted)
-
-
-def _parquet(path: Path) -> Table:
-    try:
-        import pyarrow
-        from pyarrow import parquet
-    except ImportError:
-        raise RecordingError('needs pyarrow: pip install pyarrow') from None
-    try:
-        file = parquet.ParquetFile(path)
-        # what it says of single columns, Arrow reads without a check that a program survives
-        _within(SAMPLES.value() - file.metadata.num_rows * file.metadata.num_columns)
-        return Table(file.schema_arrow.names, _parquet_rows(file, pyarrow))
-    except pyarrow.ArrowException as error:
-        raise RecordingError(f'no Parquet, {one_line(error)}') from None
-
-
-def _parquet_rows(file: Any, pyarrow: Any) -> Iterator[tuple[int, Sequence[Text]]]:
-    first = 1
-    try:
-        for batch in file.iter_batches(_BLOCK, use_threads=False):
-            columns = []
-            for column in batch.columns:
-                if pyarrow.types.is_timestamp(column.type):
-                    # Python's dates know microseconds
-                    column = column.cast(pyarrow.timestamp('us', column.type.tz), safe=False)
-                columns.append([_cell(value) for value in column.to_pylist()])
-            yield from enumerate(zip(*columns, strict=True), first)
-            first += batch.num_rows
-    except pyarrow.ArrowException as error:
-        raise RecordingError(f'after row {first - 1}: no Parquet, {one_line(error)}') from None
-
-
-def _cell(value: Any) -> Text:
-    """Return a value of a file as a cell: a vector if it is a list."""
-    return [_text(part) for part in value] if isinstance(value, list) else _text(value)
-
-
-def _text(value: Any) -> str:
-    """Return a single value as a text; NaN and null are not samples."""
-    if value is None or value != value:
-        return ''
-    if isinstance(value, (bool, int, float)):
-        return repr(int(value) if isinstance(value, bool) else value)
-    if isinstance(value, datetime):
-        return value.isoformat()
-    return value if isinstance(value, str) else f'a {type(value).__name__}'
-
-
-def _refusing(read: Callable[[Path], Table]) -> Callable[[Path], Table]:
-    """Return a reader that says in a line what a library says of a damaged file."""
-    def reader(path: Path) -> Table:
-        try:
-            return read(path)
-        except (OSError, RecordingError):
-            raise
-        except MemoryError:
-            raise RecordingError('not enough memory for what the file says it holds') from None
-        except PlainDataError as error:
-            raise RecordingError(str(error)) from None
-        except _DAMAGE as error:
-            raise RecordingError(f'no {path.suffix} that can be read, '
-                                 f'{one_line(error) or type(error).__name__}') from None
-    return reader
-
-
-_READERS: Mapping[str, Callable[[Path], Table]] = {
-    suffix: _refusing(read) for suffixes, read in (
-        ('.npy', _npy), ('.npz', _npz), ('.mat', lambda path: _arrays(read_mat(path))),
-        ('.json', _json), ('.jsonl .ndjson', _json_lines), ('.parquet .pq', _parquet))
-    for suffix in suffixes.split()}
+        begun = stream.read(max(map(len, _STARTS)))
+    kind = next((kind for start, kind in _STARTS.items() if begun.startswith(start)),
+                path.suffix.lower() if path.suffix.lower() in _READERS else '')
+    if kind and kind not in _READERS:
+        raise RecordingError(f'{path}: {kind}')
+    return kind

@@ -19,7 +19,7 @@ from simgap.inputs.limits import CSV_LINE, TEXT
 from simgap.logs.channel import NANOSECONDS, RecordingError, RecordingWarning
 
 _NUMBER = re.compile(r'[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,4})?', re.ASCII)
-_LATEST_S = 9.2e9  # what 64 bits of nanoseconds hold
+LATEST_S = 9.2e9  # what 64 bits of nanoseconds hold
 # Gets the share of a large file that has been read; a command shows it.
 READ: ContextVar[Callable[[float], None]] = ContextVar('READ', default=lambda share: None)
 
@@ -55,8 +55,8 @@ def parse_number(text: str, cell: Cell) -> float:
 def parse_nanoseconds(text: str, cell: Cell, per_unit: int = NANOSECONDS) -> int:
     """Read a decimal time stamp [ns]; RecordingError, with its place, beyond 9.2e9 s."""
     value = parse_number(text, cell)
-    if abs(value) * per_unit > _LATEST_S * NANOSECONDS:
-        raise cell.refuse(f'{one_line(repr(text), 40)} is beyond {_LATEST_S:g} s')
+    if abs(value) * per_unit > LATEST_S * NANOSECONDS:
+        raise cell.refuse(f'{one_line(repr(text), 40)} is beyond {LATEST_S:g} s')
     return int((Decimal(text) * per_unit).to_integral_value())
 
 

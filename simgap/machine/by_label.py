@@ -10,6 +10,7 @@ from statistics import fmean
 from simgap.machine.arrays import Course, FloatArray, Point
 from simgap.machine.catalogue import Catalogue
 from simgap.machine.effect import Effect, Form, Parameter
+from simgap.machine.everyday import as_configured
 from simgap.machine.experiment import Experiment
 from simgap.machine.machine import DisturbanceInput, Machine
 from simgap.machine.motion import Motion, TimeScales
@@ -39,8 +40,8 @@ def by_label(machine: Machine) -> Machine:
 
 
 def without_labels(machine: Machine) -> Machine:
-    """Return the machine as it was before `by_label`."""
-    return machine.inner if isinstance(machine, ByLabel) else machine
+    """Return the machine as it was before `by_label`, and without everyday sizes."""
+    return as_configured(machine.inner if isinstance(machine, ByLabel) else machine)
 
 
 def split(form: Form, key: str, values: Sequence[str]) -> Form:
@@ -149,21 +150,6 @@ class _LabelledNuisances(Nuisances):
         """Return the nuisances that take over what they can; sizes count with their mean."""
         return self._inner.absorb(point, self._labels.mean(removed))
 
-    def take_over(self, point: Point, forms: Sequence[Form]) -> tuple[dict[str, float], set[str]]:
-        """Return a point at which effects alone stand for their numbers, under each label."""
-        labels = self._labels
-        bases = [labels.base_of(form) for form in forms]
-        result, held = dict(point), set[str]()
-        for k in range(len(next(iter(labels.groups.values())))):
-            found, names = self._inner.take_over(labels.in_test(point, k), bases)
-            result.update({name: value for name, value in found.items() if name in result})
-            held |= names
-            for p in (p for form in forms for p in form.parameters):
-                base, label = labels.parts(p.name)
-                if label is None or labels.groups[label[0]][k] == label[1]:
-                    result[p.name] = found[base]
-        return result, held
-
 
 class ByLabel(Machine):
     """A machine with a further form of each effect for each label of its tests."""
@@ -227,6 +213,9 @@ class ByLabel(Machine):
     def with_noise_at(self, point: Point) -> Machine:
         """Return the machine with the noise of a motion; sizes count with their mean."""
         return self._around(self.inner.with_noise_at(self.labels.mean(point)))
+
+    def linearised_at(self, point: Point) -> Machine:
+        return self._around(self.inner.linearised_at(self.labels.mean(point)))
 
 
 def can_be_split(form: Form) -> bool:

@@ -46,15 +46,15 @@ class Catalogue(dict[str, Effect]):
                 return form
         raise KeyError(f'{effect.id}: {name}')
 
-    def relatives(self, ident: str) -> Iterator[tuple[Effect, float]]:
-        """Yield an effect in other places, with the factor of its size that does as much."""
+    def relatives(self, ident: str) -> Iterator[Effect]:
+        """Yield an effect in other places."""
         effect = self[ident]
         for part in effect.parts:
-            yield self[part], float(len(effect.parts))
+            yield self[part]
         for whole in self.values():
             if effect.id in whole.parts:
-                yield whole, 1.0 / len(whole.parts)
-                yield from ((self[part], 1.0) for part in whole.parts if part != effect.id)
+                yield whole
+                yield from (self[part] for part in whole.parts if part != effect.id)
 
     def counterpart(self, form: Form, effect: Effect, part: Effect) -> Form:
         """Return the form of an effect's part that corresponds to a form of the effect."""

@@ -2,11 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Whether a machine keeps its contract: what is missing or wrong is named before a fit."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 import math
 
 import numpy as np
 from simgap.errors import UserError
+from simgap.inputs.schema import nearest
 from simgap.machine.effect import Effect, Form, Parameter
 from simgap.machine.experiment import Experiment
 from simgap.machine.machine import Machine
@@ -55,6 +56,18 @@ def check_tests(machine: Machine) -> None:
                for item, readings in zip(machine.experiments, machine.simulate([{}])[0],
                                          strict=True)):
         raise UserError(names + AT_REST)
+
+
+def without(machine: Machine, effects: Sequence[str], limits: Iterable[str]) -> Machine:
+    """Return a machine without some effects; UserError names one, or a limit, that it lacks."""
+    signals = machine.experiments[0].channels
+    for kind, names, known in (('effect', effects, [*machine.catalogue]),
+                               ('signal', limits, signals)):
+        for name in names:
+            if name not in known:
+                raise UserError(f'{name}: no such {kind}{nearest(name, known)}; there are '
+                                + ', '.join(known))
+    return machine.without(effects)
 
 
 def moves(experiment: Experiment, readings: np.ndarray | None,  # type: ignore[type-arg]
@@ -129,7 +142,7 @@ def _check_parameter(kind: str, item: Parameter, experiments: int) -> None:
     if not item.low <= (item.start if item.is_shape else 0.0) <= item.high:
         neutral = f'its start {item.start:g}' if item.is_shape else 'the neutral value 0'
         raise MachineError(f'{name}: bounds {item.low:g} to {item.high:g} without {neutral}')
-    if not math.isfinite(item.low) or not math.isfinite(item.high):
+    if not (math.isfinite(item.low) and math.isfinite(item.high)):
         raise MachineError(f'{name}: bounds {item.low:g} to {item.high:g} given, allowed are '
                            'finite ones')
     if not 0.0 < item.step < math.inf:

@@ -3,16 +3,9 @@
 """A number that may differ from the model, and an effect: such numbers with one physical cause."""
 
 from dataclasses import dataclass, field
-import math
 
-from simgap.machine.arrays import Point
-
-# Sizes that may be tried out before a fit: of a single number as shares of its bounds; of a wave
-# the least amplitude in steps, the factor to the next one, and the phases [rad].
+# Sizes that may be tried out before a fit, as shares of the bounds.
 _SHARES = (-0.9, -0.6, -0.4, -0.25, -0.15, -0.08, 0.02, 0.05, 0.1, 0.2, 0.35, 0.6, 0.9)
-_LEAST_AMPLITUDE = 2.5
-_GROWTH = 2.5
-_PHASES = tuple(2.0 * math.pi * k / 6 for k in range(6))
 
 
 @dataclass(frozen=True)
@@ -75,25 +68,12 @@ class Form:
 
     @property
     def trials(self) -> list[dict[str, float]]:
-        """Return sizes to try: shares of a single one's bounds, or amplitudes of a wave."""
-        if self.is_wave and len(self.sizes) == 2:  # with labels there are more
-            sine, cosine = self.sizes
-            least = _LEAST_AMPLITUDE * sine.step
-            amplitudes = [least * _GROWTH ** k for k in range(
-                1 + int(math.log(max(sine.high / least, 1.0), _GROWTH)))]
-            return [{sine.name: amplitude * math.sin(phase),
-                     cosine.name: amplitude * math.cos(phase)}
-                    for amplitude in amplitudes for phase in _PHASES]
+        """Return sizes to try of a single one, as shares of its bounds."""
         if len(self.sizes) != 1:
             return []
         [size] = self.sizes
         return [{size.name: share * (size.high if share > 0.0 else -size.low)}
                 for share in _SHARES if share > 0.0 or size.low < 0.0]
-
-    def implausibility(self, point: Point, deviations: Point) -> float:
-        """Return how little values look like the effect; above 1 is implausible."""
-        # `deviations` has their standard deviations; it is empty where they are not known
-        return 0.0
 
 
 @dataclass(frozen=True)

@@ -131,6 +131,10 @@ class Machine(ABC):
         # a jitter of the time stamps makes a fast reading noisier than a slow one
         return self
 
+    def linearised_at(self, point: Point) -> Machine:
+        """Return the machine with what it takes as linear, if anything, taken so at `point`."""
+        return self
+
     def simulate_disturbed(self, point: Point, place: DisturbanceInput,
                            course: Course) -> list[FloatArray]:
         """

@@ -5,7 +5,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 
 from simgap.machine.arrays import Point
-from simgap.machine.effect import Form, Parameter
+from simgap.machine.effect import Parameter
 
 
 class Nuisances(list[Parameter]):
@@ -25,12 +25,3 @@ class Nuisances(list[Parameter]):
     def absorb(self, point: Point, removed: Point) -> dict[str, float]:
         """Return the nuisances of `point` that take over what they can of `removed` values."""
         return dict(point)
-
-    def take_over(self, point: Point, forms: Sequence[Form]) -> tuple[dict[str, float], set[str]]:
-        """
-        Return a point at which effects alone stand for their numbers, and what is held at zero.
-
-        A nuisance may stand for the very number that an effect changes; data do not determine
-        both. The effect takes over what such nuisances have in common. By default none is held.
-        """
-        return dict(point), set()

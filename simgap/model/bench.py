@@ -11,7 +11,7 @@ from simgap.model.allowed_tests import own_tests
 from simgap.model.declared import Model
 from simgap.model.diagnose import diagnose_logs
 from simgap.next_test.investigation import Bench, Investigation, InvestigationPlan
-from simgap.next_test.rivals import Rival
+from simgap.search.rival import Rival
 from simgap.verdict.diagnosis import Progress
 from simgap.verdict.record import Verdict
 

@@ -79,7 +79,7 @@ def effect(name: str, *forms: OwnForm, cause: str = '', look: str = '', simpler:
 
     name : 'component.effect'
     cause, look : its physical cause, and what the readings show, one sentence each
-    simpler : effect that it becomes at an end of its range, tried in its place
+    simpler : effect that it becomes at an end of its range; the two are left out together
     forms : alternative forms, if there are several
     numbers : of its only form: `size` or `shape` by name
 

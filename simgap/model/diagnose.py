@@ -12,18 +12,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from simgap.errors import UserError
 from simgap.fit.least_squares import LeastSquares
-from simgap.inputs.schema import nearest
 from simgap.logs.log import Log
+from simgap.machine import check
 from simgap.machine.by_label import ByLabel, without_labels
-from simgap.machine.check import check_tests
 from simgap.machine.contract import Machine, Point
 from simgap.model.declared import Model
 from simgap.model.machine import OwnMachine
 from simgap.model.pushes import pushes
 from simgap.model.response import derivative_error
-from simgap.next_test.rivals import Rival
+from simgap.search.rival import Rival
 from simgap.settings import DEFAULT, Settings
 from simgap.verdict.diagnosis import diagnose, Progress
 from simgap.verdict.record import Verdict
@@ -66,16 +64,8 @@ def diagnose_logs(model: Model, logs: Sequence[Log],
     earlier : answers of a verdict on some of the logs, see `diagnosis.diagnose`
     """
     machine = OwnMachine(model, logs)
-    check_tests(machine)
-    for effect in without:
-        if effect not in machine.catalogue:
-            raise UserError(f'{effect}: no such effect{nearest(effect, machine.catalogue)}; there '
-                            f'are {", ".join(machine.catalogue)}')
-    for name in limits or ():
-        if name not in model.readings:
-            raise UserError(f'{name}: no such reading{nearest(name, model.readings)}; there are '
-                            f'{", ".join(model.readings)}')
-    found = diagnose(machine.without(without), progress, threads,
+    check.check_tests(machine)
+    found = diagnose(check.without(machine, without, limits or ()), progress, threads,
                      _for_derivatives_of(machine, settings), limits, earlier)
     return OwnVerdict(**vars(found), numbers=numbers_as_fitted(
         found.machine, found.best.state.point()), pushes=pushes_found(found, settings))

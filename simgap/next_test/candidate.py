@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 from simgap.machine.contract import FloatArray
-from simgap.next_test.rivals import Rival
 from simgap.next_test.separation import Separation
+from simgap.search.rival import Rival
 
 # An effect that does not show at any size is as bad as this many times the best.
 _NEVER = 1e3

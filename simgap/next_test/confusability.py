@@ -16,7 +16,8 @@ from simgap.fit.least_squares import LeastSquares
 from simgap.fit.noise import with_model_error
 from simgap.fit.state import FitState, prior_precision, proper_precision
 from simgap.machine.contract import FloatArray, Machine, Parameter
-from simgap.settings import DEFAULT, Settings
+from simgap.machine.everyday import everyday_of
+from simgap.settings import DEFAULT
 
 # a size is found to this share of itself
 _SHARE = 0.01
@@ -35,8 +36,7 @@ class Confusability:
 
 
 def confusability(machine: Machine, progress: Callable[[float], None] = lambda share: None,
-                  settings: Settings = DEFAULT, inflated: float = 1.0,
-                  among: Collection[str] = ()) -> Confusability:
+                  inflated: float = 1.0, among: Collection[str] = ()) -> Confusability:
     """
     Say which effects the tests of a machine can tell apart, with the readings that it predicts.
 
@@ -44,7 +44,7 @@ def confusability(machine: Machine, progress: Callable[[float], None] = lambda s
     names the effects that are judged; empty for all.
     """
     problem = LeastSquares(machine.with_experiments(
-        with_model_error(machine.experiments, settings.noise)), settings=settings)
+        with_model_error(machine.experiments, DEFAULT.noise)))
     return visibility(problem, problem.start(machine.nuisances, {}), progress, inflated, among)
 
 
@@ -53,32 +53,42 @@ def visibility(problem: LeastSquares, state: FitState,
                inflated: float = 1.0, among: Collection[str] = ()) -> Confusability:
     """Say how large each effect must be to show beside `state`, a fit of the nuisances."""
     machine, settings = problem.machine, problem.settings
-    jacobian = state.jacobian
+    # an everyday size would imitate its own effect; up to the tolerance nothing is said to show
+    here, state = state.point(), _without_everyday(state)
+    jacobian = state.jacobian.astype(float)
     known = state.hessian + np.diag(proper_precision(state.parameters))
     scale = np.sqrt(np.diag(known))
     factor = factored(known / np.outer(scale, scale), ROUNDING)
-    ids, units, sizes, remainders = [], [], [], []
-    price = inflated * (settings.penalty.effect + settings.penalty.parameter)
+    ids, units, sizes, columns, remainders = [], [], [], [], []
+    price = inflated * settings.evidence.shows
     imitation = _Imitation(state, settings.interval.derivative_error)
     asked = [effect for effect in machine.catalogue.values() if not among or effect.id in among]
     for i, effect in enumerate(asked):
         progress(i / len(asked))
         form = machine.catalogue.typical_form(effect)
         first = form.parameters[0]
-        column = problem.jacobian({**state.point(), **form.start}, [first], state.residual,
+        column = problem.jacobian({**here, **form.start}, [first], state.residual,
                                   central=False)[:, 0]
-        cross = (jacobian.T @ column).astype(float)
+        cross = jacobian.T @ column.astype(float)
         imitated = solved(factor, cross / scale) / scale
         ids.append(effect.id)
         units.append(first.unit)
         sizes.append(imitation.least_visible(first, float(column @ column), cross, price))
+        columns.append(column)
         remainders.append(column - jacobian @ imitated)
-    matrix = np.array(remainders)
-    gram = matrix @ matrix.T
+    # what nuisances imitate has the price of their priors
+    shape = (len(asked), state.residual.size)
+    gram = np.reshape(columns, shape) @ np.reshape(remainders, shape).T
     size = np.sqrt(np.maximum(np.diag(gram), 1e-30))
     alike = (gram / np.outer(size, size)) ** 2
     return Confusability(tuple(ids), np.array(sizes), tuple(units), np.asarray(alike),
                          settings.confusability.alike)
+
+
+def _without_everyday(state: FitState) -> FitState:
+    kept = [j for j, p in enumerate(state.parameters) if not everyday_of(p.name)]
+    return FitState(tuple(state.parameters[j] for j in kept), state.x[kept], state.residual,
+                    state.jacobian[:, kept], state.weight, state.cost)
 
 
 class _Imitation:

@@ -20,9 +20,9 @@ from simgap.next_test.rival_fits import confirmed_separation
 from simgap.next_test.rivals import Findings, known_to
 from simgap.next_test.separation import Separation
 from simgap.next_test.space import TestSpace
-from simgap.settings import DEFAULT, Settings
+from simgap.settings import DEFAULT
 
-SEPARATE, SHARPEN, DETECT = OBJECTIVES = ('separate', 'sharpen', 'detect')
+SEPARATE, SHARPEN, DETECT = 'separate', 'sharpen', 'detect'
 # Rules to compare with: all numbers of the likeliest rival sharpened alike, and none at all.
 D_OPTIMAL, RANDOM = 'd-optimal', 'random'
 # in which the sizes count at which effects show
@@ -45,9 +45,9 @@ _NOTHING = 1e-6
 Progress = Callable[[float, str], None]
 
 
-def objective_for(findings: Findings, settings: Settings = DEFAULT) -> str:
+def objective_for(findings: Findings) -> str:
     """Return what the next test is for: to tell open answers apart, or to contradict them."""
-    return SEPARATE if findings.are_open(settings) else DETECT
+    return SEPARATE if findings.are_open() else DETECT
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ class TestDesign:
     """
     The search for the next test, after the `findings` of the tests so far.
 
-    `objective` is one of `OBJECTIVES`, or `D_OPTIMAL` or `RANDOM` to compare with. `suspected` has
+    `objective` is one of `CRITERIA`. `suspected` has
     ids of effects for `detect`, empty for all. `threads` tests are simulated at once.
     """
 
@@ -75,12 +75,11 @@ class TestDesign:
 
     def __init__(self, space: TestSpace, findings: Findings = Findings(),
                  objective: str = SEPARATE, suspected: Sequence[str] = (), threads: int = 2,
-                 settings: Settings = DEFAULT, effort: DesignEffort = DesignEffort(),
-                 seed: int = 0) -> None:
+                 effort: DesignEffort = DesignEffort(), seed: int = 0) -> None:
         self._space, self._findings = space, findings
         self._rivals, self._inflated = findings.rivals, findings.inflated
         self._objective, self._suspected = objective, list(suspected)
-        self._threads, self._settings, self._effort = threads, settings, effort
+        self._threads, self._effort = threads, effort
         self._random = np.random.default_rng(seed)
         self._judge: Callable[[Candidate], Candidate] = {
             SEPARATE: self._separated, SHARPEN: self._sharpened, D_OPTIMAL: self._sharpened,
@@ -136,21 +135,17 @@ class TestDesign:
         return test.tightest[1] <= self._effort.margin
 
     def _helps(self, test: Candidate) -> bool:
-        least = self._settings.planning.least_information
+        least = DEFAULT.planning.least_information
         if test.separation is not None:
-            return test.separation.information(self._temperature) >= least
+            return test.separation.information() >= least
         if test.deviations:
             return any(after < (1.0 - least) * before
                        for before, after in test.deviations.values())
         return not test.sizes or any(math.isfinite(size) for size, _ in test.sizes.values())
 
-    @property
-    def _temperature(self) -> float:
-        return self._settings.verdict.temperature
-
     def _score(self, found: Separation) -> float:
         """Return the information that is left if less of the evidence comes true."""
-        return found.information(self._temperature, self._settings.planning.caution)
+        return found.information(DEFAULT.planning.caution)
 
     def _planned(self, test: Candidate) -> Machine:
         """Return the machine in a test, as noisy as it has been so far."""
@@ -165,13 +160,13 @@ class TestDesign:
         use = self._space.use(machine, points)
         if self._objective != SEPARATE:
             return replace(test, use=use)
-        rough = separation(machine, self._rivals, self._inflated, self._settings, follow=False)
+        rough = separation(machine, self._rivals, self._inflated, follow=False)
         return replace(test, use=use, score=self._score(rough))
 
     def _separated(self, test: Candidate) -> Candidate:
         """Judge a test with all tolerances free, to first order, and what else it shows."""
         machine = self._planned(test)
-        promised = separation(machine, self._rivals, self._inflated, self._settings)
+        promised = separation(machine, self._rivals, self._inflated)
         # no size is reported, only their mean is compared
         return replace(test, promised=promised, sizes=self._sizes(machine.low_fidelity()))
 
@@ -203,14 +198,13 @@ class TestDesign:
     def _confirmed(self, test: Candidate) -> Candidate:
         """Fit each rival to the readings of the others; the rest then counts in full."""
         return replace(test, kept=1.0, confirmed=confirmed_separation(
-            self._planned(test), self._rivals, self._inflated, self._settings,
-            test.promised.shrunk if test.promised else ()))
+            self._planned(test), self._rivals, self._inflated))
 
     def _sharpened(self, test: Candidate) -> Candidate:
         """Judge how well a test determines the numbers of the likeliest rival."""
         machine = self._planned(test)
         rival = max(self._rivals, key=lambda item: item.probability)
-        names, before, after = deviations(machine, rival, self._inflated, self._settings)
+        names, before, after = deviations(machine, rival, self._inflated)
         own = {p.name for form in rival.forms_of(machine) for p in form.parameters}
         wanted = [j for j, name in enumerate(names) if name in own]
         if self._objective == D_OPTIMAL or not wanted:
@@ -232,8 +226,7 @@ class TestDesign:
         machine = machine.with_experiments([
             replace(e, measured=machine.predict({}, k))
             for k, e in enumerate(machine.experiments)])
-        found = confusability(machine, settings=self._settings, inflated=self._inflated,
-                              among=self._suspected)
+        found = confusability(machine, inflated=self._inflated, among=self._suspected)
         return {name: (float(size), unit) for name, size, unit in zip(
             found.effects, found.detectable, found.units, strict=True)}
 
@@ -266,14 +259,14 @@ class TestDesign:
         # Each part is the logarithm of an efficiency, but for what all tests share.
         if test.separation is None:
             return -math.log(coarseness)
-        unlisted = max(self._settings.planning.unlisted, self._findings.unlisted)
+        unlisted = max(DEFAULT.planning.unlisted, self._findings.unlisted)
         information = test.kept * self._score(test.separation)
         return ((1.0 - unlisted) * math.log(max(information, _NOTHING))
                 - unlisted * math.log(coarseness))
 
     def _alike(self, judged: Sequence[Candidate]) -> list[tuple[int, int, Mapping[str, float]]]:
         compared = [test for test in judged if test.separation is not None]
-        limit = self._settings.planning.alike * self._temperature
+        limit = DEFAULT.planning.alike
         found = []
         for i, j in combinations(range(len(self._rivals)), 2):
             lacks = [test.separation.least_lack()[i, j] for test in compared

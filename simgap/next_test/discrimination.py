@@ -4,7 +4,6 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-import math
 
 import numpy as np
 from scipy import linalg
@@ -13,13 +12,14 @@ from simgap.fit.least_squares import LeastSquares
 from simgap.fit.noise import with_model_error
 from simgap.fit.state import proper_precision
 from simgap.machine.contract import FloatArray, Machine, Parameter, Point
-from simgap.next_test.rivals import known_to, numbers_of, Rival
-from simgap.next_test.separation import LEAST, odds_of, prior_of, Separation, shrunk_at_most
-from simgap.settings import DEFAULT, Settings
+from simgap.next_test.rivals import known_to, numbers_of
+from simgap.next_test.separation import LEAST, prior_of, Separation
+from simgap.search.rival import Rival
+from simgap.settings import DEFAULT
 
 
 def separation(machine: Machine, rivals: Sequence[Rival], inflated: float,
-               settings: Settings = DEFAULT, follow: bool = True) -> Separation:
+               follow: bool = True) -> Separation:
     """
     Return how well the planned tests of a machine would tell rivals apart, to first order.
 
@@ -28,33 +28,28 @@ def separation(machine: Machine, rivals: Sequence[Rival], inflated: float,
     catalogue lacks an effect or a form.
     """
     points = [known_to(machine, rival) for rival in rivals]
-    problem = planned(machine, rivals, points, settings)
+    problem = planned(machine, rivals, points)
     residuals = np.array([problem.residuals(point) for point in points])
     prior, lack = prior_of(rivals), np.zeros((len(rivals), len(rivals)))
     channels = problem.experiments[0].channels
     power = np.zeros(len(channels))
-    shrunk: list[dict[str, float]] = []
     for j, rival in enumerate(rivals):
         off = residuals[j] - residuals
         price = np.zeros(len(rivals))
         rest = off
         if follow:
-            price, rest, shares = _followed(problem, rival, points[j], off, inflated)
-            shrunk.append(shares)
+            price, rest = _followed(problem, rival, points[j], off, inflated)
         lack[:, j] = 0.5 * (np.sum(rest ** 2, axis=1) + price) / inflated
         power += prior @ np.sum(rest.reshape(len(rivals), -1, power.size) ** 2, axis=1)
-    if not follow:
-        shrunk = [shrunk_at_most(rivals, i, lack[i]) for i in range(len(rivals))]
     parts = power / max(float(power.sum()), LEAST)
-    return Separation(prior, lack, dict(zip(channels, parts.tolist(), strict=True)),
-                      odds=odds_of(rivals, lack, shrunk), shrunk=shrunk)
+    return Separation(prior, lack, dict(zip(channels, parts.tolist(), strict=True)))
 
 
 def deviations(machine: Machine, rival: Rival, inflated: float,
-               settings: Settings = DEFAULT) -> tuple[tuple[str, ...], FloatArray, FloatArray]:
+               ) -> tuple[tuple[str, ...], FloatArray, FloatArray]:
     """Return a rival's m names, and their covariances before and after tests, shape (m, m)."""
     point = known_to(machine, rival)
-    problem = planned(machine, [rival], [point], settings)
+    problem = planned(machine, [rival], [point])
     numbers = numbers_of(machine, rival)
     jacobian = problem.jacobian(point, numbers, problem.residuals(point), central=False)
     known = (jacobian.T @ jacobian).astype(float) + _precision(rival, numbers, inflated)
@@ -67,26 +62,24 @@ def deviations(machine: Machine, rival: Rival, inflated: float,
             np.asarray(inflated * inverse[np.ix_(places, places)]))
 
 
-def planned(machine: Machine, rivals: Sequence[Rival], points: Sequence[Point],
-            settings: Settings) -> LeastSquares:
+def planned(machine: Machine, rivals: Sequence[Rival], points: Sequence[Point]) -> LeastSquares:
     """Return the planned tests as the likeliest rival makes them, with a model's usual error."""
     likeliest = int(np.argmax([rival.probability for rival in rivals]))
     [readings] = machine.simulate([points[likeliest]])
     experiments = [replace(e, measured=values) for e, values in zip(
         machine.experiments, readings, strict=True) if values is not None]
-    return LeastSquares(machine.with_experiments(with_model_error(experiments, settings.noise)),
-                        settings=settings)
+    return LeastSquares(machine.with_experiments(with_model_error(experiments, DEFAULT.noise)))
 
 
 def _followed(problem: LeastSquares, rival: Rival, point: dict[str, float], off: FloatArray,
-              inflated: float) -> tuple[FloatArray, FloatArray, dict[str, float]]:
+              inflated: float) -> tuple[FloatArray, FloatArray]:
     """Return what remains of differences after a rival's numbers have followed them."""
     # The differences `off` are in standard deviations, shape (r, n). What is returned: what the
-    # steps away from what is known add to each chi-square, shape (r,), the differences that are
-    # left, and the share to which the deviation of each size in doubt shrinks.
+    # steps away from what is known add to each chi-square, shape (r,), and the differences that
+    # are left.
     numbers = numbers_of(problem.machine, rival)
     if not numbers:
-        return np.zeros(len(off)), off, {}
+        return np.zeros(len(off)), off
     jacobian = problem.jacobian(point, numbers, problem.residuals(point), central=False)
     precision = _precision(rival, numbers, inflated)
     known = (jacobian.T @ jacobian).astype(float) + precision
@@ -94,16 +87,9 @@ def _followed(problem: LeastSquares, rival: Rival, point: dict[str, float], off:
     slopes = (off.astype(np.float32) @ jacobian).astype(float) / scale
     factor = factored(known / np.outer(scale, scale), ROUNDING)
     steps = solved(factor, slopes.T).T / scale
-    in_doubt = {doubt.size for doubt in rival.doubts.values()}
-    shares = {}
-    for place, name in enumerate(p.name for p in numbers):
-        if name in in_doubt:
-            unit = np.eye(scale.size)[place]
-            variance = inflated * solved(factor, unit)[place] / scale[place] ** 2
-            shares[name] = min(math.sqrt(max(variance, 0.0)) / rival.deviation(name), 1.0)
     # summed directly: the difference of two large sums in single precision cannot resolve it
     return (np.asarray(np.sum((steps @ precision) * steps, axis=1)),
-            np.asarray(off - steps @ jacobian.T), shares)
+            np.asarray(off - steps @ jacobian.T))
 
 
 def _precision(rival: Rival, numbers: Sequence[Parameter], inflated: float) -> FloatArray:

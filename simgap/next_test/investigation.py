@@ -13,11 +13,12 @@ from typing import Any
 
 from simgap.drafts import drafted
 from simgap.errors import UserError
-from simgap.next_test.design import DesignEffort, objective_for, TestDesign
+from simgap.next_test.design import objective_for, TestDesign
 from simgap.next_test.proposal import as_data
-from simgap.next_test.rivals import Findings, Rival
+from simgap.next_test.rivals import Findings
 from simgap.next_test.space import TestSpace
-from simgap.settings import DEFAULT, Settings
+from simgap.search.rival import Rival
+from simgap.settings import DEFAULT
 from simgap.verdict.diagnosis import Progress as Share
 from simgap.verdict.record import Verdict
 
@@ -72,11 +73,10 @@ class Investigation:
     """
 
     def __init__(self, folder: Path, bench: Bench, plan: InvestigationPlan = InvestigationPlan(),
-                 first: Any = None, threads: int = 2, settings: Settings = DEFAULT,
-                 effort: DesignEffort = DesignEffort()) -> None:
+                 first: Any = None, threads: int = 2) -> None:
         """Begin, or go on where an earlier run of the same investigation was."""
         self._folder, self._bench, self._plan, self._first = folder, bench, plan, first
-        self._threads, self._settings, self._effort = threads, settings, effort
+        self._threads = threads
         folder.mkdir(parents=True, exist_ok=True)
         # more tests may be allowed later
         asked = {'until': plan.until, 'duration_s': plan.duration, 'seed': plan.seed,
@@ -125,7 +125,7 @@ class Investigation:
         until = self._plan.until
         if last['effects'] == _UNKNOWN:
             # no verdict gives it more
-            until *= self._settings.verdict.most_unknown
+            until *= DEFAULT.verdict.most_unknown
         return last['probability'] >= until and last['effects'] == before['effects']
 
     def _path(self, stem: str, number: int, suffix: str = '.json') -> Path:
@@ -153,11 +153,10 @@ class Investigation:
                     'test': space.as_data(self._first)}, self._first
         findings = self._findings(number - 1)
         found = TestDesign(
-            space, findings, objective_for(findings, self._settings), threads=self._threads,
-            settings=self._settings, effort=self._effort, seed=self._plan.seed + number).run(
+            space, findings, objective_for(findings), threads=self._threads,
+            seed=self._plan.seed + number).run(
                 lambda share, doing: progress(f'design of test {number}', share))
-        return (as_data(found, space, self._settings),
-                found.tests[0].test if found.tests else None)
+        return as_data(found, space), found.tests[0].test if found.tests else None
 
     def _findings(self, number: int) -> Findings:
         """Return what the verdict after a test says; nothing before the first one."""

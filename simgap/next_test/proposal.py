@@ -11,9 +11,10 @@ import numpy as np
 from simgap.machine.contract import FloatArray
 from simgap.next_test.candidate import Candidate, Proposal
 from simgap.next_test.design import DesignEffort, SEPARATE
-from simgap.next_test.rivals import known_to, Rival
+from simgap.next_test.rivals import known_to
 from simgap.next_test.space import TestSpace
-from simgap.settings import DEFAULT, Settings
+from simgap.search.rival import Rival
+from simgap.settings import DEFAULT
 
 _OTHERS, _SENSORS, _SIZES = 4, 3, 12
 # A sensor tells two rivals apart if it reads better than this share of its own signal.
@@ -28,7 +29,7 @@ def named(rival: Rival) -> str:
     return ' + '.join(rival.named) or 'none'
 
 
-def as_data(proposal: Proposal, space: TestSpace, settings: Settings = DEFAULT) -> dict[str, Any]:
+def as_data(proposal: Proposal, space: TestSpace) -> dict[str, Any]:
     """Return a proposal as plain data, for the JSON."""
     rivals = proposal.rivals
     found: dict[str, Any] = {
@@ -41,14 +42,14 @@ def as_data(proposal: Proposal, space: TestSpace, settings: Settings = DEFAULT) 
     if proposal.tests:
         best = proposal.tests[0]
         found |= {'family': best.family, 'test': space.as_data(best.test),
-                  'limits_used': dict(best.use), **_told(best, rivals, settings)}
+                  'limits_used': dict(best.use), **_told(best, rivals)}
         found['others'] = [
-            {'family': test.family, 'test': space.as_data(test.test), **_told(
-                test, rivals, settings)} for test in proposal.tests[1:1 + _OTHERS]]
+            {'family': test.family, 'test': space.as_data(test.test), **_told(test, rivals)}
+            for test in proposal.tests[1:1 + _OTHERS]]
     else:
         found['beyond_limits'] = [
             {'family': test.family, 'limit': test.tightest[0], 'share': test.tightest[1],
-             **_told(test, rivals, settings)} for test in proposal.beyond]
+             **_told(test, rivals)} for test in proposal.beyond]
     found['not_told_apart'] = [
         {'rivals': [named(rivals[i]), named(rivals[j])],
          'sensors': [{'sensor': sensor, 'difference': share}
@@ -57,28 +58,28 @@ def as_data(proposal: Proposal, space: TestSpace, settings: Settings = DEFAULT) 
     return found
 
 
-def _told(test: Candidate, rivals: Sequence[Rival], settings: Settings) -> dict[str, Any]:
+def _told(test: Candidate, rivals: Sequence[Rival]) -> dict[str, Any]:
     found: dict[str, Any] = {'score': test.score}
     if test.deviations:
         found['deviations'] = {name: {'before': before, 'after': after}
                                for name, (before, after) in test.deviations.items()}
     told, first = test.separation, test.promised
     if told is not None:
-        temperature, sure = settings.verdict.temperature, settings.planning.sure
-        after = told.posterior(temperature)
+        sure = DEFAULT.planning.sure
+        after = told.posterior()
         found['expected'] = {
             'confirmed': test.confirmed is not None,
             'right_before': float(told.prior @ told.prior),
-            'right_after': told.expected(temperature),
-            'information_nat': told.information(temperature),
-            'surely': told.surely(temperature, sure), 'sure': sure,
+            'right_after': told.expected(),
+            'information_nat': told.information(),
+            'surely': told.surely(sure), 'sure': sure,
             'each': [{'effects': list(rival.named) or ['none'], 'before': float(told.prior[i]),
                       'after_if_true': float(after[i, i]), 'after': after[i].tolist()}
                      for i, rival in enumerate(rivals)],
             'lack_of_fit': told.lack.tolist()}
         if first is not None:
             found['channels'] = dict(first.channels)
-            found['expected']['promised'] = first.expected(temperature)
+            found['expected']['promised'] = first.expected()
         found['sizes_over_least'] = test.coarseness
     elif test.sizes:
         found['smallest_sizes'] = {
@@ -166,15 +167,14 @@ class ProposalContents:
     panels: Sequence[Panel]  # what the likeliest rivals would read, by signal
 
 
-def contents(proposal: Proposal, space: TestSpace, settings: Settings = DEFAULT,
-             effort: DesignEffort = DesignEffort()) -> ProposalContents:
-    """Return what the page about a proposal says; `effort` has the margin that was kept."""
-    data = as_data(proposal, space, settings)
+def contents(proposal: Proposal, space: TestSpace) -> ProposalContents:
+    """Return what the page about a proposal says."""
+    data = as_data(proposal, space)
     said = lines(data)
     if not data['helps']:
         return ProposalContents('No test within the limits helps', said[1].strip(), data, ())
     lead = (f'Chosen among {proposal.tried} simulated tests. Every rival keeps '
-            f'{100.0 * effort.margin:.0f} % of every limit in it.')
+            f'{100.0 * DesignEffort.margin:.0f} % of every limit in it.')
     return ProposalContents(f'Next test: {data["family"]}', lead, data, _panels(proposal, space))
 
 

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Each rival fitted to the readings that each other one would give in a planned test."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from copy import copy
 from dataclasses import replace
 
@@ -10,26 +10,27 @@ import numpy as np
 from simgap.fit.least_squares import LeastSquares
 from simgap.machine.contract import FloatArray, Machine, Parameter, Point
 from simgap.next_test.discrimination import planned
-from simgap.next_test.rivals import known_to, numbers_of, Rival
-from simgap.next_test.separation import odds_of, prior_of, Separation
-from simgap.settings import DEFAULT, Settings
+from simgap.next_test.rivals import known_to, numbers_of
+from simgap.next_test.separation import prior_of, Separation
+from simgap.search.rival import Rival
+from simgap.settings import DEFAULT
 
 # A fit goes this many standard deviations away at most, and a difference quotient this far.
 _FAR, _STEP = 8.0, 0.3
+_ITERATIONS = DEFAULT.search.iterations
 
 
-def confirmed_separation(machine: Machine, rivals: Sequence[Rival], inflated: float,
-                         settings: Settings = DEFAULT,
-                         shrunk: Sequence[Mapping[str, float]] = ()) -> Separation:
+def confirmed_separation(machine: Machine, rivals: Sequence[Rival],
+                         inflated: float) -> Separation:
     """
     Return how well tests tell rivals apart, with each fitted to the readings of each other one.
 
     The true rival is fitted as well, from a standard deviation away along each direction: what
-    such a fit leaves because it sticks is not evidence against the others. `shrunk` comes from
-    `separation`, whose parameters the others are.
+    such a fit leaves because it sticks is not evidence against the others. Parameters are those of
+    `separation`.
     """
     points = [known_to(machine, rival) for rival in rivals]
-    problem = planned(machine, rivals, points, settings)
+    problem = planned(machine, rivals, points)
     readings = machine.simulate(points)
     left = np.zeros((len(rivals), len(rivals)))
     ends: dict[tuple[int, int], Point] = {}
@@ -39,23 +40,19 @@ def confirmed_separation(machine: Machine, rivals: Sequence[Rival], inflated: fl
         for i, truth in enumerate(readings):
             fitted = LeastSquares(own.with_experiments([
                 replace(e, measured=values) for e, values in zip(
-                    problem.experiments, truth, strict=True) if values is not None]),
-                settings=settings)
+                    problem.experiments, truth, strict=True) if values is not None]))
             if i == j:
                 state = fitted.start(own.nuisances, own.elsewhere(), None)
             else:
                 state = fitted.start(own.nuisances, {}, jacobian)
                 # it depends on the point, and not on what was measured
                 jacobian = state.base_jacobian
-            state = fitted.fit(state, settings.search.iterations)
-            for _ in range(settings.planning.passes):
-                state = fitted.fit(fitted.refreshed(state), settings.search.iterations)
+            state = fitted.fit(state, _ITERATIONS)
+            state = fitted.fit(fitted.refreshed(state), _ITERATIONS)
             left[i, j] = state.cost / inflated
             ends[i, j] = own.own(state.point())
     lack = np.maximum(left - np.diag(left)[:, np.newaxis], 0.0)
-    shrunk = shrunk or [{} for _ in rivals]
-    return Separation(prior_of(rivals), lack, points=ends, odds=odds_of(rivals, lack, shrunk),
-                      shrunk=shrunk)
+    return Separation(prior_of(rivals), lack, points=ends)
 
 
 class _Continued(Machine):

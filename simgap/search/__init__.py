@@ -1,3 +1,3 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""The search for effects: from the numbers known within a tolerance to pairs of effects."""
+"""The search for effects: hypotheses, the moves between them, and the evidence that ranks them."""

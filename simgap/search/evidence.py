@@ -1,43 +1,107 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""The fits that a verdict was made from, and the same as plain data."""
+"""
+The evidence for a hypothesis, by which the search ranks and the verdict decides.
 
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
-from typing import Any
+It is the marginal likelihood of Laplace's approximation (D. J. C. MacKay, Information Theory,
+Inference, and Learning Algorithms, 2003, chapter 27), with the cost E of the residuals, their
+Gauss-Newton Hessian H, the precision P of the priors and the values x at the end of the fit:
 
-from simgap.machine.contract import Form
+    log p(data | h) = -(E + x P x / 2) / T - log det(1 + P^-1/2 H P^-1/2 / T) / 2
+
+less the same determinant of the nuisances alone, which all hypotheses have and whose derivatives
+differ by their errors.
+
+A size without a prior has one as wide as a single mean sample would tell (R. E. Kass,
+L. Wasserman, Journal of the American Statistical Association 90, 928, 1995), so that its price
+does not turn with its bounds; a shape has an even one within them. T is by how much less than one
+a sample counts, because residuals are loud or correlated. Each effect has to gain, for itself,
+what shows an effect beside all that a model leaves out.
+
+No form of an effect is exact. What a further effect gains has to exceed the share of the whole
+gain that an error of form leaves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from simgap.fit.least_squares import LeastSquares
+from simgap.fit.state import FitState, proper_precision
+from simgap.machine.contract import FloatArray, Form
 from simgap.search.hypothesis import Hypothesis
-from simgap.settings import Settings
-from simgap.verdict import verdict
-from simgap.verdict.verdict import Decision, LackOfFit
+from simgap.settings import EvidenceSettings
 
 
 @dataclass(frozen=True)
 class Evidence:
-    """What a verdict is decided on."""
+    """The evidence for hypotheses that were fitted at one and the same noise."""
 
-    hypotheses: Sequence[Hypothesis]  # everything that was fitted, the nuisances alone among them
-    lacks: Sequence[LackOfFit]  # what each of them leaves
-    inflation: float = 1.0  # of the cost's differences, see `intervals.inflation`
+    settings: EvidenceSettings
+    samples: int  # that were fitted
+    temperature: float  # by how much less than one a sample counts
+    gain: float  # of the best over none [half chi-square]
+    scale: float = 1.0  # of the noise, where the misfit counts as such
 
-    def decide(self, settings: Settings) -> Decision:
-        """Decide with these thresholds, on what the best hypothesis leaves under them."""
-        best = verdict.best(self.hypotheses, settings, self.inflation)
-        lack = next(lack for h, lack in zip(self.hypotheses, self.lacks, strict=True) if h is best)
-        return verdict.decide(self.hypotheses, lack, settings, self.inflation)
+    @classmethod
+    def among(cls, problem: LeastSquares, hypotheses: Sequence[Hypothesis]) -> Evidence:
+        """Return the evidence by what the best of some hypotheses leaves."""
+        best = min(hypotheses, key=lambda h: h.cost)
+        none = min((h.cost for h in hypotheses if not h.effects), default=best.cost)
+        return cls(problem.settings.evidence, problem.samples,
+                   temperature(problem, best.state), none - best.cost, problem.scale)
 
-    def as_data(self) -> list[dict[str, Any]]:
-        """Return the evidence as plain data, for the JSON."""
-        return [{'effects': list(h.effects), 'doubts': h.doubts, 'cost': h.cost,
-                 'inflation': self.inflation,
-                 'forms': [_form_data(form, h.state.point()) for form in h.forms],
-                 'lack_of_fit': asdict(lack)}
-                for h, lack in zip(self.hypotheses, self.lacks, strict=True)]
+    def __call__(self, hypothesis: Hypothesis) -> float:
+        """Return the logarithm of the evidence times the prior, with the prices."""
+        state = hypothesis.state
+        free = np.array([p.high > p.low for p in state.parameters], bool)
+        hessian = state.hessian[np.ix_(free, free)] / self.temperature
+        unit = self._precision(state)[free] ** -0.5
+        scaled = np.eye(unit.size) + hessian * np.outer(unit, unit)
+        own = {p.name for form in hypothesis.forms for p in form.parameters}
+        shared = np.array([p.name not in own for p in state.parameters], bool)[free]
+        # what the nuisances have is that of all hypotheses, and their derivatives err
+        occam = 0.5 * float(np.linalg.slogdet(scaled)[1]
+                            - np.linalg.slogdet(scaled[np.ix_(shared, shared)])[1])
+        return float(-self.price(hypothesis.forms) - state.cost / self.temperature - occam)
+
+    def _precision(self, state: FitState) -> FloatArray:
+        """Return the precision of the priors; a size without one has that of a single sample."""
+        one = np.diag(state.hessian) / max(self.samples, 1)
+        sizes = np.array([not p.prior_sigma and not p.is_shape for p in state.parameters], bool)
+        return np.where(sizes & (one > 0.0), one, proper_precision(state.parameters))
+
+    def price(self, forms: Sequence[Form]) -> float:
+        """Return what a hypothesis has to pay for effects of these forms."""
+        sought = self.settings.sought * sum(form.scanned for form in forms)
+        shows = len(forms) * self.settings.shows / self.scale ** 2
+        return shows + sought + max(len(forms) - 1, 0) * self.price_of_form
+
+    @property
+    def price_of_form(self) -> float:
+        """Return what an error of form could be worth."""
+        return self.settings.form_error ** 2 * self.gain / self.temperature
+
+    def ranked(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """Return hypotheses, the best first."""
+        return sorted(hypotheses, key=self, reverse=True)
 
 
-def _form_data(form: Form, point: Mapping[str, float]) -> dict[str, Any]:
-    return {'name': form.name, 'scanned': form.scanned, 'parameters': [
-        {'name': p.name, 'unit': p.unit, 'value': point[p.name], 'low': p.low, 'high': p.high,
-         'prior_sigma': p.prior_sigma, 'tolerance': p.tolerance, 'is_shape': p.is_shape}
-        for p in form.parameters]}
+def temperature(problem: LeastSquares, state: FitState) -> float:
+    """Return how much less than one a sample counts, by the level and colour of a residual."""
+    # the effective number of samples of a first-order process: n (1 - f) / (1 + f)
+    counts, factors = [], []
+    for k in range(len(problem.experiments)):
+        for z in problem.residuals_of(state, k).T:
+            pairs = np.isfinite(z[1:]) & np.isfinite(z[:-1])
+            if pairs.sum() < problem.settings.noise.least_samples:
+                continue
+            clip = problem.settings.noise.clip
+            one, next_one = np.clip(z[:-1][pairs], -clip, clip), np.clip(z[1:][pairs], -clip, clip)
+            power = float(np.mean(one ** 2))
+            same = float(np.clip(np.mean(one * next_one) / max(power, 1e-9), 0.0, 0.95))
+            counts.append(int(pairs.sum()))
+            factors.append(max(power, 0.2) * (1.0 + same) / (1.0 - same))
+    return max(1.0, float(np.average(factors, weights=counts))) if counts else 1.0

@@ -91,12 +91,8 @@ def screened(problem: LeastSquares, state: FitState, known: Sequence[Sensitivity
         gain = _promised(full, slope, np.r_[low, [p.low for p in form.sizes]],
                          np.r_[high, [p.high for p in form.sizes]]) - own_gain
         found.setdefault(item.effect, []).append((gain, item))
-    best: list[tuple[float, Sensitivity]] = []
-    close = problem.settings.search.second_form
-    for forms in found.values():
-        # a screening does not tell the forms of an effect apart: a close second is kept
-        first, *others = sorted(forms, key=lambda pair: -pair[0])
-        best += [first, *(pair for pair in others[:1] if pair[0] > close * first[0])]
+    # a screening does not tell the forms of an effect apart: the second one is kept, too
+    best = [pair for forms in found.values() for pair in sorted(forms, key=lambda p: -p[0])[:2]]
     return sorted(best, key=lambda pair: -pair[0])
 
 
@@ -118,7 +114,7 @@ def scan(problem: LeastSquares, state: FitState, known: Sequence[Sensitivity],
     Parameters are those of `screened`.
     """
     here = state.point()
-    count = problem.settings.search.scanned
+    count = problem.settings.search.partners
     until = problem.machine.time_scales.scan_s
     worst = int(np.argmax([problem.loss(state.residual[problem.rows(k)])
                            for k in range(len(problem.experiments))]))

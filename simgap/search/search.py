@@ -1,323 +1,301 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""The search for effects: from the nuisances alone over single effects to pairs."""
+"""
+The search for effects: the best hypotheses are expanded until the best has been expanded.
 
-from bisect import insort
-from collections.abc import Callable, Collection, Iterable, Sequence
+The nuisances are fitted alone. While something strong is missing, the misfit counts as noise, and
+the nuisances stay close to their priors. Effects are added that a screening by derivatives
+promises, and those that fit best when their sizes are tried out. The noise is lowered to what the
+best leaves. The best are expanded in turn by all moves (`moves`), and ranked by their evidence.
+All this is done with coarser steps of the simulation and the beginning of each test. The best are
+then fitted to the whole tests, at the noise that the best of them shows. The best one is also
+fitted with one effect less, or with two of its effects joined in one, until it stays the best.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
 
 import numpy as np
+from simgap.fit.broyden import Jacobian
 from simgap.fit.least_squares import LeastSquares
-from simgap.fit.starts import led, settled, with_initial_conditions
-from simgap.fit.state import FitState
-from simgap.machine.contract import Form, Point
-from simgap.next_test.rivals import Rival
-from simgap.search.continued import continued
+from simgap.fit.noise import with_noise_left
+from simgap.fit.starts import with_initial_conditions
+from simgap.machine.contract import Form
+from simgap.search import moves
+from simgap.search.evidence import Evidence, temperature
 from simgap.search.hypothesis import Hypothesis
-from simgap.search.refitting import dropped, refitted, shared_jacobian
+from simgap.search.rival import Rival
 from simgap.search.screening import (
-    jacobian_of_form, rescaled, scan, screened, sensitivities, Sensitivity,
+    rescaled, same_effect, scan, screened, sensitivities, Sensitivity,
 )
-from simgap.search.single_fits import added, added_at, gone_on, moved, others_than, split
+
+Progress = Callable[[float, str], None]
+Move = Callable[[], 'Hypothesis | None']
+
+
+@dataclass(frozen=True)
+class Found:
+    """What a search has found."""
+
+    problem: LeastSquares  # the whole tests, with the noise of the motion that was found
+    hypotheses: Sequence[Hypothesis]  # the best first; the nuisances alone are among them
+    evidence: Evidence  # by which they are ranked
+
+    @property
+    def best(self) -> Hypothesis:
+        """Return the hypothesis with the greatest evidence."""
+        return self.hypotheses[0]
+
+    @property
+    def none(self) -> Hypothesis:
+        """Return the nuisances alone."""
+        return next(h for h in self.hypotheses if not h.effects)
 
 
 class Search:
     """The search for missing effects; `progress` gets the share done and what is being done."""
 
-    def __init__(self, problem: LeastSquares, progress: Callable[[float, str], None],
-                 threads: int = 1, earlier: Sequence[Rival] = ()) -> None:
-        self._pool, self._earlier = ThreadPoolExecutor(threads), earlier
-        self.settings = problem.settings.search
-        self.machine = problem.machine.truncated()
-        self.problem = LeastSquares(self.machine, settings=problem.settings)
-        self.progress = progress
-        self.sensitivities: list[Sensitivity] = []
-        # what the earlier answers do for all tests, at the sensors' own noise
-        self._earlier_fits: list[Hypothesis] = []
+    def __init__(self, whole: LeastSquares, progress: Progress, threads: int = 1,
+                 earlier: Sequence[Rival] = ()) -> None:
+        self._pool = ThreadPoolExecutor(threads)
+        self._whole, self._progress, self._earlier = whole, progress, earlier
+        self._options = whole.settings.search
+        self._problem = LeastSquares(whole.machine.truncated(), settings=whole.settings)
+        self._found: dict[frozenset[str], Hypothesis] = {}
+        self._sensitivities: list[Sensitivity] = []
 
-    def run(self) -> tuple[Hypothesis, list[Hypothesis], list[Hypothesis]]:
-        """Return the nuisances alone, and what one effect and two can do, each the best first."""
-        self.progress(0.0, 'nuisances')
-        self._earlier_fits = continued(self.problem, self._earlier, self._pool.map)
-        none, singles = self._none_and_singles()
-        singles = self._at_lower_noise(singles)
-        singles = self._leading_fits(singles, self._to_settle(singles[0]))
-        if self.problem.scale > 1.0:
-            singles = self._at_lower_noise(self._exchanged(singles))
-        self.progress(0.5, 'pairs of effects')
-        pairs = self._pairs(singles)
-        if pairs:
-            scale = self.problem.scale
-            pairs = self._improved(self._at_lower_noise(pairs))
-            # costs compare at one and the same noise only
-            singles = [replace(h, state=self.problem.rescaled(h.state, scale)) for h in singles]
-        self.progress(0.7, 'the best in full')
-        return none, singles, pairs
-
-    def _none_and_singles(self) -> tuple[Hypothesis, list[Hypothesis]]:
-        """Fit the nuisances alone and with single effects, again where the former got stuck."""
+    def run(self) -> Found:
+        """Return the best hypotheses, fitted to the whole tests."""
+        self._progress(0.0, 'nuisances')
         none = self._nuisances_alone()
-        singles = self._singles(none)
-        for _ in range(self.settings.fresh_starts):
-            freed = self._freed(none, singles[0])
-            if freed is None:
-                break
-            none, singles = freed, self._singles(freed)
-        return none, singles
+        self._progress(0.1, 'sensitivity to each effect')
+        self._sensitivities = sensitivities(self._problem, none.state, self._pool.map)
+        self._keep([none])
+        self._keep(self._continued(none))
+        self._progress(0.2, 'single effects')
+        self._make(self._additions(none, self._options.adds, scanning=True))
+        self._lower_noise()
+        self._expand()
+        return self._compared()
 
-    def _earlier_answers(self) -> list[Hypothesis]:
-        """Return the earlier answers as they fit all tests, with costs at the present noise."""
-        return [replace(h, state=self.problem.rescaled(h.state, 1.0)) for h in self._earlier_fits]
+    # -- the hypotheses ------------------------------------------------------------------------
+
+    def _keep(self, hypotheses: Iterable[Hypothesis | None]) -> None:
+        """Keep hypotheses; of those with the same effects the better one."""
+        for h in hypotheses:
+            if h is not None:
+                known = self._found.get(frozenset(h.effects))
+                if known is None or h.cost < known.cost:
+                    self._found[frozenset(h.effects)] = h
+        # derivatives take most of the memory: the best keep theirs
+        for h in self._ranked()[self._options.finalists:]:
+            if h.effects and h.state.base_jacobian.size:
+                self._found[frozenset(h.effects)] = h.without_jacobian()
+
+    def _evidence(self) -> Evidence:
+        return Evidence.among(self._problem, list(self._found.values()))
+
+    def _ranked(self) -> list[Hypothesis]:
+        return self._evidence().ranked(list(self._found.values()))
+
+    def _make(self, wanted: Iterable[Move]) -> None:
+        self._keep(self._pool.map(lambda move: move(), wanted))
+
+    # -- the moves -----------------------------------------------------------------------------
+
+    def _additions(self, base: Hypothesis, count: int, scanning: bool) -> Iterator[Move]:
+        """Yield moves that add what is promised most; what could not lead is not fitted."""
+        problem, evidence, options = self._problem, self._evidence(), self._options
+        own, top = evidence(base), evidence(self._ranked()[0])
+        for gain, item in screened(
+                problem, base.state, self._sensitivities, base.effects)[:count]:
+            if own + options.hope * gain / evidence.temperature > top:
+                yield partial(moves.added, problem, base, item)
+        if scanning and not base.has_course and self._leaves_much(base):
+            for item, sizes in scan(problem, base.state, self._sensitivities, base.effects):
+                yield partial(moves.added, problem, base, item, sizes)
+
+    def _changes(self, base: Hypothesis) -> Iterator[Move]:
+        """Yield moves that take an effect away or put it elsewhere."""
+        problem, catalogue = self._problem, self._problem.machine.catalogue
+        for effect, was in base.items:
+            yield partial(moves.dropped, problem, base, effect)
+            if was.is_course:
+                continue
+            rest = [other for other in base.effects if other != effect]
+            for other in catalogue.relatives(effect):
+                if not same_effect(catalogue, other.id, rest):
+                    yield partial(moves.exchanged, problem, base, effect, other.id,
+                                  catalogue.counterpart(was, catalogue[effect], other))
+            for form in self._other_forms(effect, was):
+                yield partial(moves.exchanged, problem, base, effect, effect, form)
+            if catalogue[effect].parts:
+                yield partial(moves.split, problem, base, effect)
+        if len(base.effects) > 1:
+            yield partial(moves.joined, problem, base)
+
+    def _other_forms(self, effect: str, was: Form) -> list[Form]:
+        """Return the other forms of an effect, as many as are worth a fit."""
+        forms = [item.form for item in self._sensitivities
+                 if item.effect == effect and item.form.name != was.name]
+        return forms if len(forms) < self._options.partners else []
+
+    def _expand(self) -> None:
+        """Expand the best hypotheses, then the best alone, until it has been expanded."""
+        options = self._options
+        expanded: dict[frozenset[str], float] = {}
+        number = 0
+        while number < options.rounds:
+            self._progress(0.3 + 0.3 * number / options.rounds, 'several effects')
+            ranked, evidence = self._ranked(), self._evidence()
+            top = evidence(ranked[0])
+            leading = [h for h in ranked if h.effects
+                       # where everything that it leaves was explained, it would lead
+                       and evidence(h) + h.cost / evidence.temperature > top
+                       and (1.0 - options.settled) * expanded.get(
+                           frozenset(h.effects), np.inf) > h.cost]
+            if not leading or (number and leading[0] is not ranked[0]):
+                break
+            leading = list(self._pool.map(
+                self._led, leading[:1 if number else options.leading]))
+            self._keep(leading)
+            if self._lower_noise():
+                continue  # a fit that still gains has not ended: what it lacks is not known yet
+            number += 1
+            # where little is left, derivatives say what is missing
+            self._sensitivities = sensitivities(self._problem, leading[0].state, self._pool.map)
+            for place, base in enumerate(leading):
+                expanded[frozenset(base.effects)] = base.cost
+                if len(base.effects) < options.rounds:
+                    self._make(self._additions(base, options.partners, scanning=not place))
+                self._make(self._changes(base))
+            self._lower_noise()
+
+    def _led(self, hypothesis: Hypothesis) -> Hypothesis:
+        """Go on with a fit, and past local minima where it leaves much."""
+        found = moves.settled(self._problem, hypothesis, 1)
+        return (moves.led(self._problem, found)
+                if self._leaves_much(found) and not found.has_course else found)
+
+    def _leaves_much(self, hypothesis: Hypothesis) -> bool:
+        """Return whether a fit leaves more than noise: all the time, or loud for a while."""
+        state = hypothesis.state
+        return max(self._problem.noise_level(state.residual),
+                   temperature(self._problem, state)) > self._options.strong
+
+    # -- the noise -----------------------------------------------------------------------------
 
     def _nuisances_alone(self) -> Hypothesis:
-        iterations = self.settings.iterations
-        point = self._beginning()
-        first = self.problem.start(self.machine.nuisances, point)
-        self.problem = self._at_noise(self.problem.noise_level(first.residual))
-        state = self.problem.start(self.machine.nuisances, point,
-                                   first.jacobian / self.problem.scale)
-        return Hypothesis((), (), self._at_falling_noise(self.problem.fit(state, iterations)))
+        """Fit the nuisances alone, with the noise that they leave."""
+        nuisances, iterations = self._problem.machine.nuisances, self._options.iterations
+        point = with_initial_conditions(self._problem, self._beginning())
+        first = self._problem.start(nuisances, point)
+        self._problem = self._at_noise(self._problem.noise_level(first.residual))
+        state = self._problem.start(nuisances, point, first.jacobian / self._problem.scale)
+        for _ in range(self._options.rounds):
+            state = self._problem.fit(state, iterations)
+            before = state.cost
+            state = self._problem.fit(self._problem.refreshed(state), iterations)
+            level, scale = self._problem.noise_level(state.residual), self._problem.scale
+            if level > self._options.lower * scale and (
+                    scale > 1.0 or before - state.cost < self._options.settled * before):
+                break
+            self._problem = self._at_noise(level)
+            state = self._problem.start(
+                nuisances, with_initial_conditions(self._problem, state.point()))
+        return Hypothesis((), (), state)
 
     def _beginning(self) -> dict[str, float]:
         """Return the nuisances as configured, or as the earlier answer has them that fits best."""
-        names = {p.name for p in self.machine.nuisances}
-        begins: list[Point] = [{}, *(
-            {name: value for name, value in known.state.point().items() if name in names}
-            for known in self._earlier_fits)]
-        return min((with_initial_conditions(self.problem, dict(begin)) for begin in begins),
-                   key=lambda point: self.problem.loss(self.problem.residuals(point)))
-
-    def _at_falling_noise(self, state: FitState) -> FitState:
-        """Go on with a fit of the nuisances alone, with the noise that it leaves."""
-        iterations = self.settings.iterations
-        for _ in range(self.settings.first_passes):
-            before, cost = self.problem.scale, state.cost
-            self.problem = self._at_noise(min(before, self.problem.noise_level(state.residual)))
-            point = with_initial_conditions(self.problem, state.point())
-            state = self.problem.fit(self.problem.start(self.machine.nuisances, point), iterations)
-            if self.problem.scale > self.settings.sharper * before and (
-                    before > 1.0 or cost - state.cost < self.settings.first_gain * cost):
-                break
-        return state
-
-    def _freed(self, none: Hypothesis, best: Hypothesis) -> Hypothesis | None:
-        """Return the nuisances from where the best single effect ended; None if as before."""
-        # An effect of next to no size may gain much, because its fit went round what held the fit
-        # of the nuisances alone. By its curvature the effect itself gains little.
-        gain = none.cost - best.cost
-        own = self.settings.stuck * gain
-        if best.has_course or best.loss_without(best.effects[0]) > own:
-            return None
-        bare = dropped(self.machine, best, best.effects[0]).state
-        state = self.problem.fit(
-            self.problem.start(bare.parameters, bare.point()), self.settings.iterations)
-        if state.cost > best.cost + own:
-            return None
-        return Hypothesis((), (), self._at_falling_noise(state))
+        names = {p.name for p in self._problem.machine.nuisances}
+        begins = [{}, *({name: value for name, value in rival.point.items() if name in names}
+                        for rival in self._earlier)]
+        return min(begins, key=lambda point: self._problem.loss(self._problem.residuals(
+            with_initial_conditions(self._problem, dict(point)))))
 
     def _at_noise(self, level: float) -> LeastSquares:
         """Return the problem with the misfit as noise, or the sensors' noise if it is small."""
-        return self.problem.at_scale(level if level > self.settings.strong else 1.0)
+        return self._problem.at_scale(level if level > self._options.strong else 1.0)
 
-    def _at_lower_noise(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
-        """Lower the noise to what the best hypothesis leaves, and fit the best again."""
-        found = list(hypotheses)
-        for _ in range(self.settings.scale_passes):
-            best = found[0].state
-            level = self.problem.noise_level(best.residual)
-            problem = self._at_noise(min(self.problem.scale, level))
-            if problem.scale > self.settings.sharper * self.problem.scale:
-                break
-            self.sensitivities = rescaled(self.sensitivities, self.problem.scale / problem.scale)
-            self.problem = problem
-            finalists = found[:self.settings.most_finalists]
-            shared = shared_jacobian(problem, best, finalists)
-            found = self._sorted(partial(
-                refitted, problem, shared, self.settings.iterations), finalists)
-        return found
+    def _lower_noise(self) -> bool:
+        """Lower the noise to what the best leaves, and fit the best again; return if it fell."""
+        lowered = False
+        while True:
+            ranked = self._ranked()
+            best, before = ranked[0], self._problem.scale
+            problem = self._at_noise(self._problem.noise_level(best.state.residual))
+            if problem.scale > self._options.lower * before:
+                return lowered
+            lowered = True
+            self._problem = problem
+            self._sensitivities = rescaled(self._sensitivities, before / problem.scale)
+            self._refit(best, [self._found[frozenset()], *(
+                h for h in ranked if h.effects)][:1 + self._options.finalists])
 
-    def _take_sensitivities(self, state: FitState) -> None:
-        self.sensitivities = sensitivities(self.problem, state, self._pool.map)
+    def _refit(self, anchor: Hypothesis, hypotheses: Sequence[Hypothesis]) -> None:
+        """Fit hypotheses to the present problem, with derivatives where one of them has ended."""
+        slopes = self._slopes(anchor)
+        self._found = {}
+        self._keep(list(self._pool.map(
+            lambda h: moves.refitted(self._problem, h, anchor, slopes), hypotheses)))
 
-    def _sorted(self, fitted: Callable[[Any], Hypothesis], of: Iterable[Any],
-                full: int | None = None) -> list[Hypothesis]:
-        # Only the first `full` keep their Jacobians, which take most of the memory; None for all.
-        found: list[Hypothesis] = []
-        for hypothesis in self._pool.map(fitted, of):
-            insort(found, hypothesis, key=self._priced)
-            if full is not None:
-                found[full:] = [h.without_jacobian() for h in found[full:]]
-        return found
+    def _slopes(self, at: Hypothesis) -> Jacobian:
+        point = at.state.point()
+        return self._problem.jacobian(
+            point, self._problem.machine.nuisances, self._problem.residuals(point), False,
+            self._problem.local_steps(at.state))
 
-    def _priced(self, hypothesis: Hypothesis) -> float:
-        return hypothesis.penalised(self.problem.settings.penalty)
-
-    def _singles(self, none: Hypothesis) -> list[Hypothesis]:
-        options = self.settings
-        self.progress(0.15, 'sensitivity to each effect')
-        self._take_sensitivities(none.state)
-        self.progress(0.25, 'single effects')
-        found = self._sorted(
-            lambda entry: added(self.problem, none, entry[1], entry[1].jacobian,
-                                options.first_iterations),
-            screened(self.problem, none.state, self.sensitivities)[:options.singles],
-            options.finalists)
-        if self.problem.leaves_much(none.state):
-            found += self._sorted(
-                lambda entry: added_at(self.problem, none, *entry),
-                scan(self.problem, none.state, self.sensitivities), options.finalists)
-            found.sort(key=self._priced)
-        self.progress(0.35, 'single effects')
-        leading = self._sorted(lambda h: gone_on(self.problem, h, options.iterations),
-                               found[:options.finalists])
-        if self.problem.leaves_much(leading[0].state):
-            leading = self._with_better(leading, self._led_by_tests(
-                none, [h.effects[0] for h in leading[:options.bases]]))
-        leading = self._with_better(
-            leading, (h for h in self._earlier_answers() if len(h.effects) == 1))
-        leading[:2] = self._sorted(self._fitted_again, leading[:2])
-        leading = self._with_relatives(leading)
-        return [*leading[:options.bases], *(h.without_jacobian() for h in leading[options.bases:])]
-
-    def _led_by_tests(self, none: Hypothesis, known: Collection[str]) -> list[Hypothesis]:
-        """Return the effects that tests promise, each fitted to its test and then to all."""
-        # A creep in which motors stick holds every fit to all tests in one of its minima, and what
-        # it promises there is wrong. Another test alone may still show what is missing.
-        asked: dict[str, tuple[int, Form]] = {}
-        for k in range(len(self.problem.experiments)):
-            weight = np.zeros_like(none.state.weight)
-            weight[self.problem.rows(k)] = none.state.weight[self.problem.rows(k)]
-            promises = screened(
-                self.problem, replace(none.state, weight=weight), self.sensitivities)
-            best = next((item for _, item in promises if not item.form.is_course), None)
-            if best is not None and best.effect not in known:
-                asked.setdefault(best.effect, (k, best.form))
-
-        def fitted(entry: tuple[str, tuple[int, Form]]) -> Hypothesis:
-            effect, (k, form) = entry
-            part = self.problem.of_experiment(k)
-            start = part.start(
-                (*none.state.parameters, *form.parameters),
-                with_initial_conditions(part, {**none.state.point(), **form.start}))
-            state = part.fit(start, self.settings.settling_iterations)
-            return self._fitted_again(Hypothesis((effect,), (form,), state))
-
-        return list(self._pool.map(fitted, asked.items()))
-
-    def _fitted_again(self, hypothesis: Hypothesis) -> Hypothesis:
-        point = with_initial_conditions(self.problem, hypothesis.state.point())
-        state = self.problem.start(hypothesis.state.parameters, point)
-        return replace(hypothesis, state=self.problem.fit(
-            state, self.settings.settling_iterations))
-
-    def _to_settle(self, best: Hypothesis) -> int:
-        """Return how many fits to go on with: more if the best leaves much and may be wrong."""
-        return (self.settings.most_finalists if self.problem.leaves_much(best.state)
-                else self.settings.bases)
-
-    def _leading_fits(self, hypotheses: Sequence[Hypothesis], count: int) -> list[Hypothesis]:
-        """Go on with the best fits: one that has stopped early hides what its effect can do."""
-        options = self.settings
-
-        def went_on(hypothesis: Hypothesis) -> Hypothesis:
-            state = settled(self.problem, hypothesis.state, options, options.settling_passes,
-                            options.settling_iterations)
-            if self.problem.leaves_much(state) and not hypothesis.has_course:
-                state = led(self.problem, state, options)
-            return replace(hypothesis, state=state)
-
-        leading = self._pool.map(went_on, hypotheses[:count])
-        return sorted([*leading, *hypotheses[count:]], key=self._priced)
-
-    def _with_relatives(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
-        """Return hypotheses with the same effects in other places added, the best first."""
-        # Each begins with the nuisances of the best and at a size that does as much. From far away
-        # its fit may have ended elsewhere, and 'both motors' then lost to one.
-        best = hypotheses[0]
-        return self._with_better(hypotheses, self._pool.map(
-            lambda item: moved(self.problem, best, *item),
-            [(place, *item) for place in range(len(best.effects))
-             for item in self.machine.catalogue.relatives(best.effects[place])
-             if item[0].id not in best.effects]))
-
-    def _exchanged(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
-        """Return hypotheses with those that a scan finds in the place of a best effect."""
-        # The nuisances alone were bent by the effect that is missing. With those of the best
-        # effect another one may fit better: gravity in place of a steady wind.
-        best = hypotheses[0]
-        if best.has_course:
-            return list(hypotheses)
-        found: list[Hypothesis] = []
-        for place, effect in enumerate(best.effects):
-            bare, kept = dropped(self.machine, best, effect), others_than(best, best.forms[place])
-            bare = replace(bare, state=self.problem.start(
-                bare.state.parameters, bare.state.point(), best.state.jacobian[:, kept]))
-            found += self._pool.map(
-                partial(lambda base, entry: added_at(self.problem, base, *entry), bare),
-                scan(self.problem, bare.state, self.sensitivities, bare.effects))
-        return self._with_better(hypotheses, found)
-
-    def _with_better(self, hypotheses: Sequence[Hypothesis],
-                     others: Iterable[Hypothesis]) -> list[Hypothesis]:
-        """Return hypotheses and others, of those with the same effects the better, sorted."""
-        found = {frozenset(zip(h.effects, h.forms, strict=True)): h for h in hypotheses}
-        for new in others:
-            key = frozenset(zip(new.effects, new.forms, strict=True))
-            if key not in found or self._priced(new) < self._priced(found[key]):
-                found[key] = new
-        return sorted(found.values(), key=self._priced)
-
-    def _pairs(self, singles: Sequence[Hypothesis]) -> list[Hypothesis]:
-        options = self.settings
-        best = singles[0]
-        # beside the best, another effect may look different: it may have hidden a ripple
-        if self.problem.leaves_much(best.state):
-            self._take_sensitivities(best.state)
-        worth = max(options.partner_gain, options.partner_gain_share * best.cost)
-        found = {tuple(sorted(pair.effects)): pair
-                 for pair in self._earlier_answers() if len(pair.effects) > 1}
-        for i, base in enumerate(singles[:options.bases]):
-            self.progress(0.5 + 0.2 * i / options.bases, 'pairs of effects')
-            far = self._priced(base) > options.base_ratio * self._priced(best) + options.reach
-            if far or (base.has_course and base is not best):
+    def _continued(self, none: Hypothesis) -> list[Hypothesis]:
+        """Return the answers of an earlier verdict, fitted from where they have ended."""
+        machine, slopes = self._problem.machine, none.state.jacobian
+        found = []
+        for rival in self._earlier:
+            if not rival.effects or not rival.is_known_to(machine):
                 continue
-            # settled, an effect may pay more, and fall behind one that has not been
-            base = base.with_jacobian(self.problem)
-            partners: list[tuple[Sensitivity, Point | None]] = [
-                (item, None) for gain, item in screened(
-                    self.problem, base.state, self.sensitivities,
-                    base.effects)[:options.partners] if gain > worth]
-            pairs = self._sorted(partial(self._partnered, best, base), partners, 0)
-            if self.problem.scale > 1.0 and not i:
-                pairs += self._sorted(partial(self._partnered, best, base), scan(
-                    self.problem, base.state, self.sensitivities, base.effects), 0)
-            pairs += [pair.without_jacobian() for pair in split(self.problem, base)]
-            for pair in pairs:
-                key = tuple(sorted(pair.effects))
-                if key not in found or self._priced(pair) < self._priced(found[key]):
-                    found[key] = pair
-        return sorted(found.values(), key=self._priced)
-
-    def _improved(self, pairs: Sequence[Hypothesis]) -> list[Hypothesis]:
-        """Go on with the best pair, and try others in the place of each of its effects."""
-        found = self._with_relatives(self._leading_fits(pairs, self.settings.bases))
-        if self.problem.scale > 1.0:
-            found = self._at_lower_noise(self._exchanged(found))
+            forms = tuple(rival.forms_of(machine))
+            names = {p.name for form in forms for p in form.parameters}
+            point = {**none.state.point(), **{
+                name: value for name, value in rival.point.items()
+                if name in names or name in none.state.point()}}
+            numbers = (*machine.nuisances, *(p for form in forms for p in form.parameters))
+            state = replace(none.state, parameters=numbers,
+                            x=np.array([point.get(p.name, p.start) for p in numbers]))
+            found.append(moves.refitted(
+                self._problem, Hypothesis(rival.effects, forms, state), none, slopes))
         return found
 
-    def _partnered(self, best: Hypothesis, base: Hypothesis,
-                   partner: tuple[Sensitivity, Point | None]) -> Hypothesis:
-        """Give a hypothesis a partner, from sizes if they are given."""
-        item, sizes = partner
-        if sizes is None:
-            pair = added(self.problem, base, item,
-                         jacobian_of_form(self.problem, base.state, item.form),
-                         self.settings.first_iterations)
-        else:
-            pair = added_at(self.problem, base, item, sizes)
-        if pair.cost < best.cost:
-            return gone_on(self.problem, pair, self.settings.pair_iterations)
-        return pair
+    # -- the whole tests -----------------------------------------------------------------------
+
+    def _compared(self) -> Found:
+        """Fit the best to the whole tests, at the noise that the best of them shows."""
+        self._progress(0.6, 'the best in full')
+        options = self._options
+        ranked = self._ranked()
+        best, none = ranked[0], self._found[frozenset()]
+        chosen = [h for h in ranked if h.effects][:options.finalists]
+        # the motion that was found may make readings noisier than the model without effects
+        settings = self._whole.settings
+        self._problem = LeastSquares(
+            self._whole.machine.with_noise_at(best.state.point()), settings=settings)
+        self._refit(best, [best])
+        best = self._found[frozenset(best.effects)]
+        point = best.state.point()
+        self._problem = LeastSquares(with_noise_left(
+            self._problem.machine.linearised_at(point), point, settings.noise,
+            settings.noise.greatest_level), settings=settings)
+        self._refit(best, [best, none, *(h for h in chosen if h.effects != best.effects)])
+        judged: set[frozenset[str]] = set()
+        while frozenset((best := self._ranked()[0]).effects) not in judged:
+            self._progress(0.75, 'the best in full')
+            judged.add(frozenset(best.effects))
+            best = moves.settled(self._problem, best, options.passes)
+            self._keep([best])
+            # they are comparable once each has begun where the best has ended
+            slopes = best.state.jacobian[:, :len(self._problem.machine.nuisances)]
+            self._keep(self._pool.map(
+                lambda h: moves.refitted(self._problem, h, best, slopes), self._ranked()[1:]))
+            self._make([*(partial(moves.dropped, self._problem, best, effect)
+                          for effect in best.effects), partial(moves.joined, self._problem, best)])
+        return Found(self._problem, self._ranked(), self._evidence())

@@ -11,15 +11,18 @@ from simgap.fit.noise import found_noise
 from simgap.machine.by_label import by_label
 from simgap.machine.check import check_machine
 from simgap.machine.contract import Machine
+from simgap.machine.everyday import with_everyday
 from simgap.next_test.confusability import could_hide
-from simgap.next_test.rivals import Findings, Rival, rivals_of
+from simgap.next_test.rivals import Findings, rivals_of
+from simgap.search.rival import Rival
 from simgap.settings import DEFAULT, Settings
-from simgap.verdict import localisation, unknown_input, verdict
+from simgap.verdict import localisation, verdict
 from simgap.verdict.conclusion import concluded
 from simgap.verdict.intervals import values_with_intervals
 from simgap.verdict.interventions import interventions
 from simgap.verdict.lack_of_fit import remainders, residual_tests
 from simgap.verdict.record import Named, Verdict
+from simgap.verdict.unknown_input import components
 
 Progress = Callable[[float, str], None]
 
@@ -40,32 +43,28 @@ def diagnose(machine: Machine, progress: Progress = lambda share, doing: None, t
     """
     with one_blas_thread():
         check_machine(machine)
-        return _diagnose(by_label(machine), progress, threads, settings, limits or {}, earlier)
+        return _diagnose(by_label(with_everyday(machine)), progress, threads, settings,
+                         limits or {}, earlier)
 
 
 def _diagnose(machine: Machine, progress: Progress, threads: int, settings: Settings,
               limits: Mapping[str, float], earlier: Sequence[Rival]) -> Verdict:
     began = time.monotonic()
     found = concluded(machine, progress, threads, settings, earlier)
-    problem, none, best, decision = found.problem, found.none, found.best, found.decision
-    places: Sequence[unknown_input.Place] = ()
+    problem, decision = found.found.problem, found.decision
+    none, best, inflated = found.found.none, found.found.best, found.found.evidence.temperature
+    unsure = decision.word == 'unknown_effect' or decision.unknown >= settings.verdict.partly
+    parts = components(found.places, settings.localisation.caution)
     located: Sequence[localisation.Located] = ()
-    parts: Mapping[str, float] = {}
-    if decision.word == 'unknown_effect' or decision.unknown >= settings.verdict.partly:
-        progress(0.95, 'where an unknown input may act')
-        parts, places = localisation.parts_of_the_unknown(problem, none.state, decision.lack)
     if decision.word == 'unknown_effect':
         located = localisation.of_the_unknown(problem, none.state, parts)
     elif decision.word in ('explained', 'partly_explained'):
         located = localisation.of_effects(problem, decision.answers, none.state, best.state)
-    else:
-        # a verdict without a gap names no place; the next test still looks into these parts
-        places = ()
     findings = Findings(
-        rivals_of(problem, decision.answers, found.evidence.inflation, settings.planning,
-                  found.doubted), found.evidence.inflation, found_noise(problem.experiments),
+        rivals_of(decision.answers, inflated, settings), inflated,
+        found_noise(problem.experiments),
         unnamed={part: decision.unknown * share for part, share in parts.items()
-                 if share >= settings.localisation.least_share})
+                 if decision.unknown * share >= settings.verdict.least_probability})
     healthy = decision.word == 'no_gap'
     hidden = could_hide(problem, (none if healthy else best).state, findings.inflated) if (
         healthy or not findings.are_open(settings)) else []
@@ -77,18 +76,20 @@ def _diagnose(machine: Machine, progress: Progress, threads: int, settings: Sett
     progress(1.0, 'done')
     return Verdict(
         word=decision.word,
-        statements=verdict.statements(decision, best),
+        statements=verdict.statements(decision),
         where=located,
         which=[Named(**answer) for answer in verdict.which(
             decision, settings.verdict, lambda answer: values_with_intervals(
                 answer, found.deviating(answer)))],
-        also_seen=verdict.also_seen(found.evidence.hypotheses, settings, found.evidence.inflation),
+        also_seen=verdict.also_seen(found.found),
         confusable=decision.confusable,
         how_far=found.reach,
         could_hide=hidden if healthy else [],
         remains=remainders(problem, best.state, limits),
-        residual_tests=residual_tests(problem, best.state, decision.lack),
-        may_enter_at=[place for place in places if place.evidence > 0.0],
-        fits=found.evidence.as_data(), planning=planning, seconds=time.monotonic() - began,
-        notes=[*machine.notes, *found.notes], labels=labels,
+        residual_tests=residual_tests(problem, best.state),
+        may_enter_at=[place for place in found.places if unsure and place.evidence > 0.0],
+        fits=[{'effects': list(h.effects), 'cost': h.cost, 'log_evidence': found.found.evidence(h)}
+              for h in found.found.hypotheses],
+        planning=planning, seconds=time.monotonic() - began,
+        notes=machine.notes, labels=labels,
         machine=problem.machine, none=none, best=best)

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """How far the gap shrinks on withheld data: what all tests, each withheld, say together."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
@@ -51,29 +51,13 @@ def held_out(problem: LeastSquares, none: Hypothesis, best: Hypothesis, threads:
         'held_out': _HALVES if single else what,
         'folds': [{'withheld': fold.name, 'judged': list(fold.judged),
                    'values': dict(zip(fold.names, fold.values.tolist(), strict=True)),
-                   'cannot_be_judged': dict(fold.reasons)} for fold in folds],
-        'training_began_at': [
-            {'effect': effect, 'form': form.name, 'values': form.start}
-            for effect, form in zip(best.effects, best.forms, strict=True)
-            if not form.is_course]}
-
-
-def shows_no_gap(reach: Mapping[str, Any], settings: Settings) -> bool:
-    """Return whether each withheld test alone is as the model says, with effects or without."""
-    return reach['after'] is not None and _no_gap(reach['before'], reach['after'], settings)
+                   'cannot_be_judged': dict(fold.reasons)} for fold in folds]}
 
 
 def _no_gap(before: float, after: float, settings: Settings) -> bool:
     """Return whether rms residuals are noise without effects, and hardly more with them."""
-    return (before ** 2 < 1.0 + settings.lack_of_fit.least_gap
+    return (before ** 2 < 1.0 + settings.held_out.no_harm
             and after ** 2 < 1.0 + settings.held_out.no_harm)
-
-
-def refuted(reach: Mapping[str, Any]) -> bool:
-    """Return whether effects close nothing of the gap of withheld data; all could be judged."""
-    closed = reach['explained_fraction']['value']
-    return closed is not None and closed <= 0.0 and not any(
-        fold['judged'] and fold['cannot_be_judged'] for fold in reach['folds'])
 
 
 def _judged(effects: Sequence[str], folds: Sequence[Withheld]) -> dict[str, Any]:
@@ -136,9 +120,9 @@ def _bootstrapped(folds: Sequence[Withheld],
     count = len(drawn[0])
     fractions = [
         explained_fraction(drawn[number % settings.draws][
-            random.integers(0, count, count)].sum(axis=0), settings.no_gap)
+            random.integers(0, count, count)].sum(axis=0))
         for number in range(settings.resamples)]
-    return (explained_fraction(blocks(None).sum(axis=0), settings.no_gap),
+    return (explained_fraction(blocks(None).sum(axis=0)),
             [float(np.quantile(fractions, 0.025)), float(np.quantile(fractions, 0.975))])
 
 
@@ -147,10 +131,10 @@ def _after(fold: Withheld) -> FloatArray:
     return fold.before if fold.after is None else fold.after
 
 
-def explained_fraction(sums: FloatArray, no_gap: float) -> float:
+def explained_fraction(sums: FloatArray) -> float:
     """Return the explained share, -1 to 1, of energy above noise, from (before, after, noise)."""
     before, after, noise = sums
     # with a floor above the energy that is left, more than all would be explained
     gap = before - min(noise, after)
-    share = float((before - after) / gap) if gap > no_gap * before else 0.0
+    share = float((before - after) / gap) if gap > 0.0 else 0.0
     return min(max(share, BOUNDS[0]), BOUNDS[1])

@@ -12,7 +12,7 @@ from simgap.fit.least_squares import LeastSquares
 from simgap.fit.state import FitState, proper_precision
 from simgap.machine.contract import FloatArray, Parameter
 from simgap.search.hypothesis import Hypothesis
-from simgap.settings import IntervalSettings
+from simgap.settings import IntervalSettings, Settings
 
 TWO_SIDED_95 = 1.96
 # Share of a variance that data of single precision can account for.
@@ -77,19 +77,19 @@ def jackknife(values: Sequence[float]) -> float:
 
 
 def deviations(hypothesis: Hypothesis, inflated: Callable[[str], float],
-               settings: IntervalSettings,
+               settings: Settings,
                between_tests: Mapping[str, float] = MappingProxyType({})) -> dict[str, float]:
     """Return robust standard deviations of the effects of a converged hypothesis, by name."""
     state = hypothesis.state
     names = [p.name for p in state.parameters]
-    known = _known(state, settings)
+    known = _known(state, settings.interval)
     found = {}
     for parameter, value in hypothesis.values:
         place = names.index(parameter.name)
         variance = _covariance(state, known / inflated(parameter.name))[place, place]
         found[parameter.name] = math.hypot(
             max(float(variance) ** 0.5, between_tests.get(parameter.name, 0.0)),
-            same_number(parameter, value), settings.model_error * value)
+            _same_number(parameter, value), settings.noise.model_error * value)
     return found
 
 
@@ -101,6 +101,6 @@ def values_with_intervals(hypothesis: Hypothesis,
         min(value + TWO_SIDED_95 * deviating[p.name], p.high)]} for p, value in hypothesis.values}
 
 
-def same_number(parameter: Parameter, value: float) -> float:
+def _same_number(parameter: Parameter, value: float) -> float:
     """Return the deviation from the tolerance of a number that the effect has taken over."""
     return parameter.tolerance / 3.0 ** 0.5 * (abs(1.0 + value) if parameter.unit == '1' else 1.0)

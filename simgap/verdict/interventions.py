@@ -3,6 +3,7 @@
 """What an intervention changes: the numbers of the named effects under each value of a label."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 import math
 from typing import Any
 
@@ -12,8 +13,9 @@ from simgap.fit.state import FitState
 from simgap.machine.by_label import ByLabel, can_be_split
 from simgap.machine.contract import FloatArray, Form, Parameter
 from simgap.search.hypothesis import Hypothesis
+from simgap.search.search import Found
 from simgap.verdict.held_out import held_out
-from simgap.verdict.intervals import contrast_deviation, same_number, TWO_SIDED_95
+from simgap.verdict.intervals import contrast_deviation, TWO_SIDED_95
 
 _ROUNDS = 2
 
@@ -27,14 +29,13 @@ def interventions(problem: LeastSquares, none: Hypothesis, best: Hypothesis,
     return [_of_label(problem, machine, none, best, key, threads) for key in machine.labels.groups]
 
 
-def simplified(problem: LeastSquares, hypotheses: Sequence[Hypothesis],
-               best: Hypothesis) -> tuple[list[Hypothesis], Hypothesis]:
-    """Return hypotheses whose best has sizes by label only where these differ."""
+def simplified(found: Found) -> Found:
+    """Return what was found with a best that has sizes by label only where these differ."""
     # The search takes an effect's form where others are still missing, and a missing effect that
     # differs makes it look as if this one did.
-    machine = problem.machine
+    problem, best, machine = found.problem, found.best, found.problem.machine
     if not isinstance(machine, ByLabel):
-        return list(hypotheses), best
+        return found
     whole = best.with_jacobian(problem)
     forms = []
     for form in best.forms:
@@ -45,16 +46,16 @@ def simplified(problem: LeastSquares, hypotheses: Sequence[Hypothesis],
             values)['differs'] for j, size in enumerate(base.sizes)) if own else True
         forms.append(form if differs else base)
     if tuple(forms) == best.forms:
-        return list(hypotheses), best
+        return found
     point = {**machine.labels.mean(best.state.point()), **best.state.point()}
     simpler = Hypothesis(best.effects, tuple(forms), _fitted(problem, best, forms, point))
-    return [simpler if set(h.effects) == set(best.effects) else h for h in hypotheses], simpler
+    return replace(found, hypotheses=[simpler, *found.hypotheses[1:]])
 
 
 def _of_label(problem: LeastSquares, machine: ByLabel, none: Hypothesis, best: Hypothesis,
               key: str, threads: int) -> dict[str, Any]:
     groups = machine.labels.groups[key]
-    numbers = _numbers(problem, machine, best, key) if best.named else []
+    numbers = _numbers(problem, machine, best, key) if best.effects else []
     common = _in_common(problem, machine, best)
     reach = held_out(problem, none, common, threads, groups,
                      f'each value of {key} in turn, with the effect as the others have it; '
@@ -77,10 +78,9 @@ def _effects(numbers: Sequence[Mapping[str, Any]], differ: bool) -> list[str]:
 
 def _numbers(problem: LeastSquares, machine: ByLabel, best: Hypothesis,
              key: str) -> list[dict[str, Any]]:
-    bases = {effect: machine.labels.base_of(form) for effect, form in zip(
-        best.effects, best.forms, strict=True)}
+    bases = {effect: machine.labels.base_of(form) for effect, form in best.items}
     chosen = {effect: machine.labels.split(form, key) for effect, form in bases.items()
-              if effect in best.named and can_be_split(form)}
+              if can_be_split(form)}
     groups = machine.labels.groups[key]
     values = list(dict.fromkeys(groups))
     point = {value: machine.labels.in_test(best.state.point(), groups.index(value))
@@ -88,8 +88,7 @@ def _numbers(problem: LeastSquares, machine: ByLabel, best: Hypothesis,
     start = {p.name: point[value][base.name] for effect, form in chosen.items()
              for value in values for base, p in zip(
                  bases[effect].sizes, _of_value(form, key, value), strict=True)}
-    forms = [chosen.get(effect, form) for effect, form in zip(
-        best.effects, best.forms, strict=True)]
+    forms = [chosen.get(effect, form) for effect, form in best.items]
     state = _fitted(problem, best, forms, {**point[values[0]], **best.state.point(), **start})
     found = []
     for effect, form in chosen.items():
@@ -120,7 +119,7 @@ def _fitted(problem: LeastSquares, best: Hypothesis, forms: Sequence[Form],
                   *(p for form in forms for p in form.parameters))
     state = problem.start(parameters, {p.name: point[p.name] for p in parameters}, central=True)
     for _ in range(_ROUNDS):
-        state = problem.refreshed(problem.fit(state, problem.settings.search.full_iterations))
+        state = problem.refreshed(problem.fit(state, problem.settings.search.iterations))
     return state
 
 
@@ -132,18 +131,17 @@ def _compared(problem: LeastSquares, state: FitState, base: Parameter,
     contrasts = np.eye(len(names))[places]
 
     # a difference is worth the price of a parameter; that is stricter than its interval
-    worth = math.sqrt(2.0 * problem.settings.penalty.parameter)
+    worth = math.sqrt(2.0 * problem.settings.evidence.number)
 
     def estimated(contrast: FloatArray) -> tuple[float, float]:
         return float(contrast @ state.x), math.hypot(
             contrast_deviation(problem, state, contrast),
-            problem.settings.interval.model_error * float(np.abs(contrast) @ np.abs(state.x)))
+            problem.settings.noise.model_error * float(np.abs(contrast) @ np.abs(state.x)))
 
     by_value = {}
     for name, contrast in zip(values, contrasts, strict=True):
         value, deviation = estimated(contrast)
-        # the tolerance of the same number cancels in a difference, and not here
-        low, high = _interval(value, math.hypot(deviation, same_number(base, value)))
+        low, high = _interval(value, deviation)
         by_value[name] = {'value': value, 'ci95': [max(low, base.low), min(high, base.high)]}
     differences = []
     for name, contrast in zip(values[1:], contrasts[1:], strict=True):

@@ -10,13 +10,13 @@ from statistics import fmean
 import numpy as np
 from simgap.fit.broyden import weighted_product
 from simgap.fit.least_squares import LeastSquares
-from simgap.fit.starts import led, settled, with_initial_conditions
+from simgap.fit.starts import settled
 from simgap.fit.state import FitState, prior_precision
 from simgap.machine.contract import FloatArray, Form, Machine, Parameter
 from simgap.search.hypothesis import Hypothesis
-from simgap.search.training import begun, Part, Slopes, trained
 from simgap.settings import Settings
 from simgap.verdict.intervals import covariance, inflation
+from simgap.verdict.part import Part
 
 
 @dataclass(frozen=True)
@@ -45,84 +45,50 @@ class Judge:
         self._problem = problem
         self._groups = groups
         self._settings: Settings = problem.settings
-        none, best = (h.with_jacobian(problem) for h in (none, best))
-        self._none, self._best = none, best
-        self._without, self._with = (Slopes.of(problem, h.state) for h in (none, best))
-        self._start: dict[str, float] = {}
-        for form in best.forms:
-            self._start.update(form.start)
+        self._none, self._best = (h.with_jacobian(problem) for h in (none, best))
+        self._start = {name: value for form in best.forms for name, value in form.start.items()}
         self._effects = {p.name for form in best.forms for p in form.parameters}
         self._nuisances = [p for p in best.state.parameters if p.name not in self._effects]
-        if best.effects or len(problem.experiments) == 1:
-            at = with_initial_conditions(problem, self._start)
-            self._neutral = Slopes.of(problem, problem.start(best.state.parameters, at))
+
+    def _fitted(self, part: Part, numbers: Sequence[Parameter], begin: Mapping[str, float],
+                of_all: Hypothesis) -> FitState:
+        """Fit some numbers to a part of the tests, with the derivatives of a fit to all."""
+        # Where it begins has seen what is withheld; where it ends, the part alone decides. What
+        # the part does not determine is not judged, see `_undetermined`.
+        own, whole = part.parameters(numbers), of_all.state.jacobian
+        column = {p.name: j for j, p in enumerate(of_all.state.parameters)}
+        slopes = np.concatenate([whole[self._problem.rows(k)] for k in part.chosen])[
+            :, [column[p.name] for p in own]]
+        problem = LeastSquares(part, settings=self._settings)
+        start = problem.start(own, dict(begin), slopes)
+        return problem.fit(start, self._settings.search.iterations)
 
     def _trained(self, part: Part) -> tuple[LeastSquares, FitState, FitState]:
         """Return a part's problem, and its fits without and with the effects."""
+        unaided = self._fitted(part, self._none.state.parameters, self._none.state.point(),
+                               self._none)
         problem = LeastSquares(part, settings=self._settings)
-        own = part.parameters(self._best.state.parameters)
-        start = begun(part, self._best.forms, self._start, self._settings)
-        found = trained(part, own, start, [
-            slopes.for_part(part, own) for slopes in (self._neutral, self._with)], self._settings)
         if not self._best.effects:
-            return problem, found, found
-        if problem.leaves_much(found) and not self._best.has_course:
-            found = led(problem, found, self._settings.search)
-        found = self._finished(problem, found)
-        # The fit without effects begins where the one with them ended. It is run to its end only
-        # where that could matter.
-        bare = part.parameters(self._none.state.parameters)
-        unaided = problem.fit(
-            problem.start(bare, found.point(), self._without.for_part(part, bare)),
-            self._settings.held_out.iterations)
-        search = self._settings.search
-        if unaided.cost < (1.0 + search.doubtful) * found.cost or problem.leaves_much(found):
-            options = self._settings.held_out
-            unaided = settled(problem, unaided, search, options.passes, options.iterations)
-            found = self._finished(problem, min(
-                found, self._added(problem, part, unaided), key=lambda s: s.cost))
-        return problem, unaided, self._taken_over(problem, found)
-
-    def _taken_over(self, problem: LeastSquares, found: FitState) -> FitState:
-        """Return a training fit whose effects alone stand for their numbers."""
-        # Only they are taken to the withheld test. What a tolerance has of them would be lost.
-        at, _ = self._problem.machine.nuisances.take_over(found.point(), self._best.forms)
-        if at == found.point():
-            return found
-        return problem.start(found.parameters, at, found.jacobian)
-
-    def _finished(self, problem: LeastSquares, found: FitState) -> FitState:
-        """Go on with a training fit while it is in a local minimum and gains."""
-        # It gets fresh derivatives. Initial conditions that were chosen before the fit may not be
-        # the best after it, and are chosen again.
-        options = self._settings.held_out
-        for _ in range(options.further_passes):
-            if not self._in_local_minimum(problem, found):
-                break
-            begin, before = found.point(), found.cost
-            starts = [found]
-            if (at := with_initial_conditions(problem, begin)) != begin:
-                moved = problem.start(found.parameters, at, found.jacobian)
-                starts.append(problem.fit(moved, options.iterations))
-            found = min((problem.fit(problem.refreshed(state), options.iterations)
-                         for state in starts), key=lambda state: state.cost)
-            if before - found.cost < self._settings.fit.least_gain:
-                break
-        return found
-
-    def _added(self, problem: LeastSquares, part: Part, unaided: FitState) -> FitState:
-        """Fit the effects on top of a fit without them."""
-        # A fit of everything at once may bend the nuisances to what a ripple does, and stop there.
-        own = part.parameters([p for p in self._best.state.parameters if p.name in self._effects])
+            return problem, unaided, unaided
+        # The effects are added to the fit without them. The values of the fit to all tests have
+        # seen what is withheld: they serve only where they show that this ends in a worse minimum.
         point = {**unaided.point(), **self._start}
-        state = problem.start_from(part.parameters(self._nuisances), unaided.jacobian, own, point)
-        return trained(part, state.parameters, point, [state.jacobian], self._settings)
-
-    def _in_local_minimum(self, problem: LeastSquares, found: FitState) -> bool:
-        """Return whether the fit to all tests fits some of them better than `found` does."""
-        # Those values have seen what is withheld. A training fit takes nothing from them.
-        of_all = problem.start(found.parameters, self._best.state.point(), found.base_jacobian)
-        return of_all.cost < found.cost - self._settings.penalty.parameter
+        for form in self._best.forms:
+            point = min([point, *({**point, **trial} for trial in form.trials)],
+                        key=lambda trial: problem.loss(problem.residuals(trial)))
+        added = part.parameters([p for p in self._best.state.parameters
+                                 if p.name in self._effects])
+        fresh = problem.jacobian(point, added, problem.residuals(point), central=True)
+        start = problem.start((*unaided.parameters, *added), point,
+                              np.column_stack([unaided.jacobian, fresh]))
+        found = settled(problem, problem.fit(start, self._settings.search.iterations), 1)
+        of_all = {name: value for name, value in self._best.state.point().items()
+                  if name in {p.name for p in found.parameters}}
+        if problem.start(found.parameters, of_all, found.base_jacobian).cost < (
+                found.cost - self._settings.evidence.number):
+            found = settled(problem, self._fitted(
+                part, self._best.state.parameters, of_all, self._best), 1)
+        return problem, unaided, found
 
     def _undetermined(self, problem: LeastSquares, unaided: FitState, found: FitState,
                       ) -> tuple[dict[str, str], FloatArray]:
@@ -130,15 +96,12 @@ class Judge:
         own = [v for p, v in zip(found.parameters, inflation(problem, found), strict=True)
                if p.name in self._effects]
         posterior = covariance(found, fmean(own or [1.0]), self._settings.interval)
-        price = self._settings.penalty.parameter
+        price = self._settings.evidence.number
         gain = unaided.cost - found.cost
-        stuck = self._in_local_minimum(problem, found)
         reasons = {}
-        for effect, form in zip(self._best.effects, self._best.forms, strict=True):
+        for effect, form in self._best.items:
             if form.is_course or any(p.experiment is not None for p in form.parameters):
                 reasons[effect] = 'its numbers belong to one test alone'
-            elif stuck:
-                reasons[effect] = 'the fit to the training data stopped in a local minimum'
             elif gain < price:
                 reasons[effect] = (f'the training data gain {max(gain, 0.0):.1f} by the effects, '
                                    f'less than the price of a parameter, {price:g}')
@@ -153,7 +116,7 @@ class Judge:
         """Return the reasons why effects cannot be judged whose label training does not have."""
         [test] = testing.experiments
         reasons = {}
-        for effect, form in zip(self._best.effects, self._best.forms, strict=True):
+        for effect, form in self._best.items:
             for key, value in {p.label for p in form.parameters if p.label}:
                 if test.labels.get(key, '') == value and not any(
                         e.labels.get(key, '') == value for e in training.experiments):
@@ -164,8 +127,8 @@ class Judge:
         """Judge on test k what the other tests have taught."""
         machine, groups = self._problem.machine, self._groups
         testing = Part(machine, [k])
-        bare = self._fitted(testing, self._none.state.parameters, {}, self._none.state.point(),
-                            self._without)
+        bare = self._fitted(testing, self._none.state.parameters, self._none.state.point(),
+                            self._none)
         problem = LeastSquares(testing, settings=self._settings)
         fold = self._fold(k, _gap(testing, bare.point()), problem.residuals_of(bare, 0))
         if not self._best.effects:
@@ -180,20 +143,14 @@ class Judge:
             return fold
         held = {**dict.fromkeys(self._effects, 0.0), **self._start,
                 **{p.name: found.value(p.name) for p in numbers}}
-        # the nuisances begin where training has left them
-        own = {p.name for p in testing.parameters(self._nuisances) if p.experiment is not None}
-        begin = {name: value for name, value in found.point().items() if name not in own}
-        state = self._fitted(testing, self._nuisances, held, {**begin, **held}, self._with)
-        # They begin again where the fit without effects has left them, or the fit to all tests.
-        # The loss of a fit hardly sees what is wrong for a moment, such as where a motor starts.
-        worse = np.sum(np.square(state.residual)) > np.sum(np.square(bare.residual))
-        others = [(bare.point(), self._without)] if worse or problem.leaves_much(state) else []
-        if self._in_local_minimum(
-                LeastSquares(testing.holding(held), settings=self._settings), state):
-            others.append((self._best.state.point(), self._with))
-        state = min([state, *(
-            self._fitted(testing, self._nuisances, held, {**other, **held}, slopes)
-            for other, slopes in others)], key=lambda fit: fit.cost)
+        holding = testing.holding(held)
+        # the nuisances begin where all tests, or training and this test alone, have left them
+        following = LeastSquares(holding, settings=self._settings)
+        own = {p.name for p in testing.parameters(self._nuisances)}
+        begin = min((self._best.state.point(), {**bare.point(), **found.point()}),
+                    key=lambda point: following.loss(
+                        following.residuals({name: point[name] for name in own})))
+        state = self._fitted(holding, self._nuisances, begin, self._best)
         point = {**held, **state.point()}
         fold = replace(fold, reasons={**reasons, **self._unseen(problem, point, state.residual,
                                                                 reasons)})
@@ -226,8 +183,7 @@ class Judge:
         numbers = self._numbers(reasons)
         if not numbers:
             return fold
-        left_out = {p.name for effect, form in zip(self._best.effects, self._best.forms,
-                                                   strict=True)
+        left_out = {p.name for effect, form in self._best.items
                     if effect in reasons for p in form.sizes}
         point = {**found.point(), **dict.fromkeys(left_out, 0.0)}
         residual = own.residuals(point)
@@ -240,16 +196,16 @@ class Judge:
         # A limit that a test does not reach changes nothing there, whatever its derivative says.
         # `residual` is that at the point.
         unseen = {}
-        for effect, form in zip(self._best.effects, self._best.forms, strict=True):
+        for effect, form in self._best.items:
             if effect not in reasons:
                 without = problem.residuals({**point, **{p.name: 0.0 for p in form.sizes}})
                 if 0.5 * float(np.sum(np.square(residual - without))) < (
-                        self._settings.penalty.parameter):
+                        self._settings.evidence.number):
                     unseen[effect] = 'the withheld data do not show it'
         return unseen
 
     def _numbers(self, reasons: Mapping[str, str]) -> list[Parameter]:
-        return [p for effect, form in zip(self._best.effects, self._best.forms, strict=True)
+        return [p for effect, form in self._best.items
                 if effect not in reasons for p in form.parameters]
 
     def _fold(self, k: int, gap: FloatArray, before: FloatArray) -> Withheld:
@@ -282,12 +238,6 @@ class Judge:
             after=_shaped(problem, residual),
             names=tuple(p.name for p in numbers), values=found.x[places],
             drawn=np.array([_shaped(problem, z) for z in drawn]))
-
-    def _fitted(self, testing: Part, nuisances: Sequence[Parameter], held: Mapping[str, float],
-                begin: Mapping[str, float], slopes: Slopes) -> FitState:
-        own = testing.parameters(nuisances)
-        return trained(testing.holding(held), own, begin, [slopes.for_part(testing, own)],
-                       self._settings)
 
 
 def _gap(machine: Machine, point: Mapping[str, float]) -> FloatArray:

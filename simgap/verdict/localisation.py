@@ -10,13 +10,12 @@ from numpy.typing import NDArray
 from simgap.fit.least_squares import LeastSquares
 from simgap.fit.state import FitState
 from simgap.machine.contract import FloatArray
-from simgap.verdict import unknown_input
-from simgap.verdict.verdict import Answer, LackOfFit
+from simgap.settings import DEFAULT, LocalisationSettings
+from simgap.verdict.verdict import Answer
 
 Located = dict[str, Any]
-# A loud residual has so many times the variance of the rest; each is at least this share of a
-# test; its ends are sought at so many places.
-_LOUDER, _LEAST_SHARE, _PLACES = 9.0, 0.1, 800
+# Places of a test at which what is loud may begin or end: their pairs are all tried.
+_PLACES = 800
 
 
 def of_effects(problem: LeastSquares, answers: Sequence[Answer], none: FitState,
@@ -30,24 +29,6 @@ def of_effects(problem: LeastSquares, answers: Sequence[Answer], none: FitState,
             parts[part] = parts.get(part, 0.0) + share
     return _located(problem, parts, lambda k: problem.residuals_of(none, k) ** 2
                     - problem.residuals_of(best, k) ** 2)
-
-
-def parts_of_the_unknown(problem: LeastSquares, none: FitState, lack: LackOfFit,
-                         ) -> tuple[dict[str, float], list[unknown_input.Place]]:
-    """Return how likely something unnamed acts in each part, and its places, likeliest first."""
-    # what is too fast for a pulse, or repeats itself, shows in one reading, and is put there
-    settings = problem.settings
-    truncated = LeastSquares(problem.machine.truncated(), settings=settings)
-    found = unknown_input.places(truncated, none.point())
-    if found[0].evidence > settings.localisation.least_evidence:
-        parts = unknown_input.components(found, settings.localisation.caution)
-    elif lack.fast > settings.verdict.fast:
-        parts = {lack.loudest: 1.0}
-    elif lack.regular > settings.verdict.regular:
-        parts = {lack.most_regular: 1.0}
-    else:
-        parts = {}
-    return parts, found
 
 
 def of_the_unknown(problem: LeastSquares, none: FitState,
@@ -65,13 +46,15 @@ def _acts(problem: LeastSquares, none: FitState, signal: str) -> Iterator[dict[s
         residual = problem.residuals_of(none, k)[:, experiment.channels.index(signal)]
         there, regimes = np.isfinite(residual), problem.machine.motion(k).regimes()
         moves = np.array([name != 'stick' for name in regimes.names])[regimes.labels]
-        if span := loud_span(residual[there], moves[there]):
+        span = loud_span(residual[there], moves[there], problem.settings.localisation)
+        if span:
             time, (first, last) = experiment.recorded_time[there], span
             yield {'test': experiment.name, 'from_s': float(time[first]) if first else None,
                    'until_s': float(time[last]) if last < time.size else None}
 
 
-def loud_span(residual: FloatArray, able: NDArray[np.bool_]) -> tuple[int, int] | None:
+def loud_span(residual: FloatArray, able: NDArray[np.bool_],
+              settings: LocalisationSettings = DEFAULT.localisation) -> tuple[int, int] | None:
     """
     Return where a residual, shape (n,), begins to be loud and where that ends; None for nowhere.
 
@@ -83,8 +66,8 @@ def loud_span(residual: FloatArray, able: NDArray[np.bool_]) -> tuple[int, int] 
     inside, loud, busy = (np.subtract.outer(x, x).T for x in (
         edges, *(np.append(0.0, np.cumsum(y))[edges] for y in (residual ** 2, able))))
     outside, quiet, idle = (x[0, -1] - x for x in (inside, loud, busy))
-    fits = ((np.minimum(inside, idle) > _LEAST_SHARE * count)
-            & (loud * outside > _LOUDER * quiet * inside))
+    fits = ((np.minimum(inside, idle) > settings.least_span * count)
+            & (loud * outside > settings.louder * quiet * inside))
     if not fits.any():
         return None
     cost = np.full(fits.shape, np.inf)
@@ -100,7 +83,7 @@ def _located(problem: LeastSquares, parts: Mapping[str, float],
     total = sum(parts.values())
     if not total:
         return []
-    settings = problem.settings.localisation
+    least = problem.settings.verdict.least_probability
     shares: dict[tuple[str, str], float] = {}
     for k, experiment in enumerate(problem.experiments):
         regimes = problem.machine.motion(k).regimes()
@@ -116,5 +99,4 @@ def _located(problem: LeastSquares, parts: Mapping[str, float],
          'share': weight / total * share / whole}
         for part, weight in parts.items() for (signal, regime), share in positive.items()]
     found.sort(key=lambda item: -float(item['share']))
-    return [item for item in found[:settings.entries]
-            if float(item['share']) > settings.least_share]
+    return [item for item in found if float(item['share']) > least]

@@ -91,7 +91,8 @@ class Verdict:
                          f'explain {100.0 * place.explained:.0f} % of the gap')
         lines += [f'  {line}' for line in _closed(self)]
         lines += [f'  {line}' for line in lines_of_labels(self.labels or ())]
-        lines += [f'  also seen: {item["effect"]}, {_why_small(item)}' for item in self.also_seen]
+        lines += [f'  also seen: {item["effect"]}, {100.0 * item["share"]:.2g} % of the gap'
+                  for item in self.also_seen]
         lines += [f'  remains: {line}' for line in _remainders(self.remains)]
         lines += [f'  note: {note}' for note in self.notes]
         return '\n'.join(lines)
@@ -113,14 +114,6 @@ def _closed(verdict: Verdict) -> list[str]:
 
 def _cannot_be_judged(effects: str, reason: str) -> str:
     return f'how much of the gap {effects} explains cannot be judged on withheld data: {reason}'
-
-
-def _why_small(item: Mapping[str, Any]) -> str:
-    if item['unsure']:
-        return 'not surely beyond its tolerance'
-    if item['within_tolerance']:
-        return 'within its tolerance'
-    return f'explains {100.0 * item["share"]:.2g} % of the gap'
 
 
 def _remainders(found: Mapping[str, Any]) -> list[str]:

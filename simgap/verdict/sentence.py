@@ -9,6 +9,7 @@ from typing import Any, NamedTuple, TYPE_CHECKING
 
 from simgap.next_test.design import objective_for, SEPARATE
 from simgap.next_test.rivals import Findings
+from simgap.settings import DEFAULT
 from simgap.verdict.intervals import jackknife, TWO_SIDED_95
 from simgap.verdict.spoken import percent, quantity, size, with_interval
 
@@ -17,8 +18,6 @@ if TYPE_CHECKING:
 
 # A machine without words of its own has so many numbers of an effect listed.
 _LISTED = 4
-# An interval is wide from this share of its number to each side; what makes half of it is why.
-_WIDE, _HALF = 0.4, 0.5
 
 
 class Said(NamedTuple):
@@ -72,9 +71,14 @@ def _designed(verdict: Verdict) -> str:
 
 
 def headline(verdict: Verdict) -> str:
-    """Return the verdict in two words, which do not contradict a remainder louder than noise."""
-    unsure = verdict.word == 'no_gap' and loud(verdict.remains)
-    return 'no effect named' if unsure else verdict.word.replace('_', ' ')
+    """Return the verdict in a few words, which nothing below them contradicts."""
+    word, rest = verdict.word, bool(loud(verdict.remains))
+    fraction = verdict.how_far['explained_fraction']['value']
+    if word in ('explained', 'partly_explained') and fraction is not None and fraction <= 0.0:
+        return 'named, but it closes nothing of data that was not fitted'
+    return {('no_gap', True): 'no effect named',
+            ('explained', True): 'explained, but something remains',
+            }.get((word, rest), word.replace('_', ' '))
 
 
 def loud(remains: Mapping[str, Any]) -> list[str]:
@@ -101,24 +105,28 @@ def _how_sure(verdict: Verdict) -> list[str]:
         lines.append('Something else acts beside that.')
     lines += [f'These data cannot tell {group[0]} from {" or ".join(group[1:])}.'
               for group in verdict.confusable if group[1:]]
-    return lines + list(_why_wide(verdict))
+    return lines + list(_doubts(verdict))
 
 
-def _why_wide(verdict: Verdict) -> Iterator[str]:
-    """Yield why the intervals of numbers are wide, where they are."""
+def _doubts(verdict: Verdict) -> Iterator[str]:
+    """Yield what makes a number doubtful: its interval, and why; the end of its range."""
     top, folds = verdict.which[0], verdict.how_far.get('folds', ())
     sizes = {p.name: p for effect in top.effects if effect in verdict.machine.catalogue
              for form in verdict.machine.catalogue[effect].forms
              if not (form.is_course or form.is_wave) for p in form.sizes}
     for name, item in top.parameters.items():
         half = 0.5 * (item['ci95'][1] - item['ci95'][0])
-        if name not in sizes or half <= _WIDE * abs(item['value']):
+        if name in sizes and item['value'] in (sizes[name].low, sizes[name].high):
+            yield (f'{name.rpartition(".")[2].replace("_", " ").capitalize()} is at the end of '
+                   'its range: widen it, or doubt the model.')
+        if name not in sizes or half <= DEFAULT.verdict.wide * abs(item['value']):
             continue
+        # what makes half of it is why
         turns = [fold['values'][name] for fold in folds if name in fold['values']]
-        if TWO_SIDED_95 * jackknife(turns) >= _HALF * half:
+        if TWO_SIDED_95 * jackknife(turns) >= 0.5 * half:
             why = ('the recordings differ: without one or another it is '
                    f'{size(min(turns), item["unit"])} to {size(max(turns), item["unit"])}')
-        elif sizes[name].tolerance >= _HALF * half:
+        elif sizes[name].tolerance >= 0.5 * half:
             why = ('a healthy machine may have up to '
                    f'{size(sizes[name].tolerance, item["unit"])} of it')
         else:

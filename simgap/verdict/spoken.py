@@ -27,13 +27,13 @@ def size(value: float, unit: str, word: str = ' percent') -> str:
     return f'{number(100.0 * value)}{word}' if unit == '1' else quantity(value, unit)
 
 
-def percent(share: float, word: str = ' percent') -> str:
+def percent(share: float) -> str:
     """Return a share from 0 to 1 in percent; 100 means all of it and 0 nothing."""
     if 0.995 <= share < 1.0:
-        return f'more than 99{word}'
+        return 'more than 99 percent'
     if 0.0 < share < 0.001:
-        return f'less than 0.1{word}'
-    return f'{100.0 * share:.{0 if abs(share) >= 0.1 else 1}f}{word}'
+        return 'less than 0.1 percent'
+    return f'{100.0 * share:.{0 if abs(share) >= 0.1 else 1}f} percent'
 
 
 def with_interval(item: Mapping[str, Any]) -> str:

@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+import math
 
 import numpy as np
 from scipy import linalg
@@ -15,8 +16,15 @@ from simgap.fit.noise import whitened
 from simgap.fit.state import prior_precision
 from simgap.machine.contract import DisturbanceInput, Experiment, FloatArray, TimeScales
 
-# Variances of the input over that of the noise that are tried.
+# Variances of the input over that of the noise that are tried, and times within which it changes,
+# in pulses.
 _RATIOS = np.logspace(-4.0, 4.0, 25)
+_SMOOTH = (0.0, 5.0)
+# Lags by which a reading may predict itself, whatever it is that repeats.
+_LAGS = 20
+# Pulses of a reading in one test.
+_MOST_PULSES = 300
+_FIRST = np.eye(1, _LAGS)[0]
 
 
 @dataclass(frozen=True)
@@ -26,22 +34,28 @@ class Place:
     name: str  # for people
     component: str  # the part of the machine
     evidence: float  # natural logarithm of how much likelier an input makes the gap
-    explained: float  # share of the gap's energy that an input explains, 0 to 1
+    # share of the gap's energy that an input explains, 0 to 1, net of what its freedom costs
+    explained: float
 
 
 def places(problem: LeastSquares, point: Mapping[str, float]) -> list[Place]:
     """Return where an unknown input may act, the likeliest first; `point` is of the nuisances."""
     evidence = _Evidence.at(problem, point)
-    found = []
-    for place in problem.machine.disturbance_inputs:
-        responses, _ = _columns(problem, point, place, evidence.residual)
-        found.append(Place(place.name, place.component, *evidence.weighed(responses, problem)[:2]))
-    scales = problem.machine.time_scales
-    for c, channel in enumerate(problem.experiments[0].channels):
-        found.append(Place(f'reading of {channel}', channel, *evidence.weighed(
-            [_pulses_of_reading(experiment, c, scales) for experiment in problem.experiments],
-            problem)[:2]))
-    return sorted(found, key=lambda place: -place.evidence)
+    scales, channels = problem.machine.time_scales, problem.experiments[0].channels
+    # name, part, evidence and share of the energy
+    found = [(place.name, place.component, *evidence.weighed(_columns(
+        problem, point, place, evidence.residual)[0], _rows_of(problem), _SMOOTH)[:2])
+        for place in problem.machine.disturbance_inputs]
+    found += [(f'reading of {channel}', channel, *evidence.weighed(
+        [_pulses_of_reading(experiment, c, scales) for experiment in problem.experiments],
+        _rows_of(problem, c))[:2]) for c, channel in enumerate(channels)]
+    # what repeats itself too fast for a pulse, such as a hum, lies in its reading
+    most = 2.0 * max(share for *_, share in found)
+    repeated = [(f'reading of {channel}', channel, *evidence.repeated(c, problem))
+                for c, channel in enumerate(channels)]
+    found += [place for place in repeated if place[-1] > most]
+    return sorted((Place(name, component, weighed, evidence.net(weighed))
+                   for name, component, weighed, _ in found), key=lambda place: -place.evidence)
 
 
 def courses(problem: LeastSquares, point: Mapping[str, float],
@@ -49,11 +63,10 @@ def courses(problem: LeastSquares, point: Mapping[str, float],
     """Return what would have to enter at a place, by test: times [s] and values, (m,) each."""
     evidence = _Evidence.at(problem, point)
     responses, times = _columns(problem, point, place, evidence.residual)
-    _, _, heights = evidence.weighed(responses, problem)
+    _, _, heights = evidence.weighed(responses, _rows_of(problem), _SMOOTH)
     found, first = [], 0
     for moments in times:
-        order = np.argsort(moments)
-        found.append((moments[order], heights[first:first + moments.size][order]))
+        found.append((moments, heights[first:first + moments.size]))
         first += moments.size
     return found
 
@@ -74,8 +87,9 @@ def _columns(problem: LeastSquares, point: Mapping[str, float], place: Disturban
             for start, response in _responses(experiment, change, float(shift), scales):
                 responses[k].append(response)
                 peaks[k].append(start + scales.pulse_s)
-    return ([np.array(columns).T for columns in responses],
-            [np.array(moments) for moments in peaks])
+    order = [np.argsort(moments) for moments in peaks]
+    return ([np.array(columns).T[:, i] for columns, i in zip(responses, order, strict=True)],
+            [np.array(moments)[i] for moments, i in zip(peaks, order, strict=True)])
 
 
 def components(found: Sequence[Place], caution: float) -> dict[str, float]:
@@ -119,16 +133,25 @@ def _responses(experiment: Experiment, change: FloatArray, shift: float,
 
 
 def _pulses_of_reading(experiment: Experiment, channel: int, scales: TimeScales) -> FloatArray:
-    """Return pulses of a reading itself, one in each column, shape (n c, pulses)."""
-    rise = scales.pulse_s
-    starts = np.arange(float(experiment.time[0]), float(experiment.time[-1]) - 2.0 * rise, rise)
+    """Return pulses of a reading itself, one in each column, shape (n, pulses)."""
+    # the cost grows with the third power of their number
+    first, last = float(experiment.time[0]), float(experiment.time[-1])
+    rise = max(scales.pulse_s, (last - first) / _MOST_PULSES)
+    starts = np.arange(first, last - 2.0 * rise, rise)
     pulses = np.maximum(0.0, 1.0 - np.abs(experiment.time[:, np.newaxis] - starts - rise) / rise)
     if experiment.colours:
         colour = experiment.colours[channel]
         pulses = np.array([whitened(pulse, colour) for pulse in pulses.T]).T
-    columns = np.zeros((*experiment.measured.shape, starts.size))
-    columns[:, channel, :] = pulses
-    return columns.reshape(-1, starts.size)
+    return pulses
+
+
+def _rows_of(problem: LeastSquares, channel: int | None = None) -> list[slice]:
+    """Return where the residuals of each test lie, or those of one channel in it."""
+    whole = [problem.rows(k) for k in range(len(problem.experiments))]
+    if channel is None:
+        return whole
+    return [slice(rows.start + channel, rows.stop, len(experiment.channels))
+            for rows, experiment in zip(whole, problem.experiments, strict=True)]
 
 
 class _Evidence:
@@ -140,16 +163,22 @@ class _Evidence:
         here = dict(point)
         residual = problem.residuals(here)
         level = max(problem.noise_level(residual), 1e-9)
-        bound = problem.settings.localisation.downweighted * level
+        bound = problem.settings.noise.clip * level
         weight = np.where(problem.valid, np.minimum(
             1.0, bound / np.maximum(np.abs(residual), 1e-12)), 0.0) / level ** 2
         nuisances = problem.machine.nuisances
         jacobian = problem.jacobian(here, nuisances, residual, central=False).astype(float)
-        return cls(residual, weight, jacobian, prior_precision(nuisances))
+        # what is quieter than the noise that is stated is no gap
+        stated = np.concatenate([np.tile([colour.level for colour in e.colours]
+                                         or np.ones(len(e.channels)), e.time.size)
+                                 for e in problem.experiments])
+        loud = min(1.0, float(np.mean((stated * residual)[problem.valid] ** 2)))
+        return cls(residual, loud, weight, jacobian, prior_precision(nuisances))
 
-    def __init__(self, residual: FloatArray, weight: FloatArray, nuisances: FloatArray,
-                 prior: FloatArray) -> None:
+    def __init__(self, residual: FloatArray, loud: float, weight: FloatArray,
+                 nuisances: FloatArray, prior: FloatArray) -> None:
         self.residual, self._weight = residual, weight
+        self._loud = loud
         weighted = nuisances * weight[:, np.newaxis]
         square = nuisances.T @ weighted + np.diag(prior)
         self._inverse = np.linalg.pinv(square, hermitian=True)
@@ -159,12 +188,12 @@ class _Evidence:
                              - self._slope @ self._inverse @ self._slope)
         self._count = float(np.count_nonzero(weight))
 
-    def weighed(self, responses: Sequence[FloatArray],
-                problem: LeastSquares) -> tuple[float, float, FloatArray]:
+    def weighed(self, responses: Sequence[FloatArray], places: Sequence[slice],
+                smooth: Sequence[float] = (0.0,)) -> tuple[float, float, FloatArray]:
         """Return the evidence for an input, the explained share of the energy, and its factors."""
+        # responses in some rows of each test; `smooth` has times within which it changes, in pulses
         squares, slopes, crosses = [], [], []
-        for k, columns in enumerate(responses):
-            rows = problem.rows(k)
+        for columns, rows in zip(responses, places, strict=True):
             weighted = columns * self._weight[rows, np.newaxis]
             squares.append(columns.T @ weighted)
             slopes.append(weighted.T @ self.residual[rows])
@@ -174,19 +203,60 @@ class _Evidence:
         square = linalg.block_diag(*squares) - projected @ cross
         slope = np.concatenate(slopes) - projected @ self._slope
         size = float(np.trace(square)) / len(square)
-        if size <= 0.0:
-            return 0.0, 0.0, np.zeros(len(square))
-        values, vectors = np.linalg.eigh(0.5 * (square + square.T) / size)
-        values = np.maximum(values, 0.0)
-        turned = vectors.T @ slope
-        along = turned ** 2 / size
         best, share, heights = 0.0, 0.0, np.zeros(len(square))
-        for ratio in _RATIOS:
-            left = self._energy - float(np.sum(along / (values + 1.0 / ratio)))
-            left = max(left / self._energy, 1e-9)
-            evidence = -0.5 * (self._count * np.log(left)
-                               + float(np.sum(np.log1p(ratio * values))))
-            if evidence > best:
-                best, share = float(evidence), 1.0 - left
-                heights = vectors @ (turned / (values + 1.0 / ratio)) / size
+        if size <= 0.0:
+            return best, share, heights
+        for pulses in smooth:
+            roots = [_root(columns.shape[1], pulses) for columns in responses]
+            own = _rows(roots, _rows(roots, square / size).T)
+            values, vectors = np.linalg.eigh(0.5 * (own + own.T))
+            values = np.maximum(values, 0.0)
+            turned = vectors.T @ _rows(roots, slope)
+            along = turned ** 2 / size
+            for ratio in _RATIOS:
+                left = self._energy - float(np.sum(along / (values + 1.0 / ratio)))
+                left = max(left / self._energy, 1e-9)
+                evidence = -0.5 * (self._count * np.log(left)
+                                   + float(np.sum(np.log1p(ratio * values))))
+                if evidence > best:
+                    best, share = float(evidence), 1.0 - left
+                    heights = _rows([root.T for root in roots], vectors @ (
+                        turned / (values + 1.0 / ratio))) / size
         return best, share, heights
+
+    def net(self, evidence: float) -> float:
+        """Return the share of the energy whose loss alone would be worth this evidence."""
+        return self._loud * (1.0 - math.exp(-2.0 * evidence / max(self._count, 1.0)))
+
+    def repeated(self, channel: int, problem: LeastSquares) -> tuple[float, float]:
+        """Return the evidence that a reading repeats itself within a pulse, and its share."""
+        products, count = np.zeros(_LAGS + 1), 0
+        for k, experiment in enumerate(problem.experiments):
+            rows = problem.rows(k)
+            if experiment.channels[channel] in experiment.quantised:
+                continue
+            shape = experiment.measured.shape
+            z = (self.residual[rows] * np.sqrt(self._weight[rows])).reshape(shape)[:, channel]
+            products += [float(z[lag:] @ z[:z.size - lag]) for lag in range(_LAGS + 1)]
+            count += int(np.count_nonzero(z))
+        if count < 10 * _LAGS:
+            return 0.0, 0.0
+        factors = linalg.solve_toeplitz(products[:-1] + 1e-9 * products[0] * _FIRST, products[1:])
+        left = float(np.clip(1.0 - factors @ products[1:] / products[0], 1e-9, 1.0))
+        evidence = -0.5 * (count * math.log(left) + _LAGS * math.log(count))
+        return max(evidence, 0.0), 1.0 - left
+
+
+def _rows(roots: Sequence[FloatArray], matrix: FloatArray) -> FloatArray:
+    """Return each test's part of a matrix or vector times the transposed root of that test."""
+    ends = np.cumsum([len(root) for root in roots])
+    return np.concatenate([root.T @ part for root, part in zip(
+        roots, np.split(matrix, ends[:-1]), strict=True)])
+
+
+def _root(count: int, pulses: float) -> FloatArray:
+    """Return a root of the covariance of `count` heights that change within so many pulses."""
+    if not pulses:
+        return np.eye(count)
+    apart = np.abs(np.subtract.outer(np.arange(count), np.arange(count)))
+    return np.asarray(np.linalg.cholesky(np.exp(-apart / pulses) + 1e-9 * np.eye(count)))

@@ -94,26 +94,3 @@ def test_both_motors_are_found_where_they_start_when_a_bias_closes_their_gaps_at
     found = with_initial_conditions(LeastSquares(drive), {})
     # within one step of the places that are tried
     assert [found.get(name, 0.0) for name in names] == pytest.approx(list(places), abs=0.16)
-
-
-def test_an_effect_takes_over_the_tolerance_of_its_own_number(model: AntennaMachine) -> None:
-    """The readings stay, and so do the differences between motors."""
-    for effect, path in (('axis.coulomb_friction', 'plant.axis.coulomb_torque'),
-                         ('torque_share.filter_1_gain', 'torque_share.filter_1.gain'),
-                         ('motors.amplifier_gain', '')):
-        form = model.catalogue[effect].forms[0]
-        size = form.sizes[0].name
-        point = {**dict.fromkeys((p.name for p in model.nuisances), 0.0), **form.start, size: 0.1}
-        for name, value in ({f'offset:{path}': 0.015} if path else {
-                'offset:motor_1.amplifier.rate_gain': 0.02,
-                'offset:motor_2.amplifier.rate_gain': 0.01}).items():
-            point[name] = value
-        taken, held = model.nuisances.take_over(point, [form])
-        assert held == ({f'offset:{path}'} if path else set())
-        assert all(taken[name] == 0.0 for name in held)
-        assert taken[size] == pytest.approx(1.1 * 1.015 - 1.0)
-        before, after = (model.simulate([at])[0] for at in (point, taken))
-        for experiment, a, b in zip(model.experiments, before, after, strict=True):
-            assert a is not None and b is not None
-            # roundings may move where a motor sticks
-            assert np.median(np.abs(a - b) / experiment.noise) < 1e-6

@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Any
 
 from antenna_drive.cli import main
-from antenna_drive.diagnosis.circuits import nearest_circuit
 from antenna_drive.diagnosis.corrected import correct, Corrected
 from antenna_drive.diagnosis.machine import AntennaMachine
 from antenna_drive.diagnosis.planned_tests import BUILT_IN, planned
 from antenna_drive.diagnosis.prediction import predict, recorder_errors
+from antenna_drive.diagnosis.sheet_settings import nearest_circuit
 from antenna_drive.diagnosis.waves import Wave
 from antenna_drive.parameters import load
 from antenna_drive.parameters.sets import changed, Drive

@@ -9,8 +9,7 @@ import math
 from pathlib import Path
 from typing import Any
 
-from antenna_drive.diagnosis.allowed_tests import AntennaTests
-from antenna_drive.diagnosis.candidate_tests import FAMILIES
+from antenna_drive.diagnosis.allowed_tests import AntennaTests, FAMILIES
 from antenna_drive.diagnosis.drive_limits import CHANNELS, DriveLimits, read_limits
 from antenna_drive.diagnosis.excitation import SheetCommand
 from antenna_drive.diagnosis.planned_tests import BUILT_IN

@@ -26,9 +26,10 @@ from simgap.errors import UserError
 from simgap.next_test import investigation as loop
 from simgap.next_test.candidate import Candidate, Proposal
 from simgap.next_test.investigation import Investigation, InvestigationPlan, lines
-from simgap.next_test.rivals import Findings, Rival
+from simgap.next_test.rivals import Findings
 from simgap.next_test.space import TestSpace
 from simgap.report.render import render
+from simgap.search.rival import Rival
 
 DRIVE = load()
 LIMITS = DriveLimits.of_drive(DRIVE)

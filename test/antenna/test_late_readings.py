@@ -87,7 +87,7 @@ def test_a_jump_between_two_samples_moves_the_whole_response() -> None:
     moved, _ = stepping(2.001)
     moved._tests = [replace(test, command=replace(
         test.command, time=test.command.time + shift, jumps=test.command.jumps + shift))]
-    moved._plans = Plans()
+    moved._plans = Plans(moved._tests)
     moved._runs.clear()
     exact, found = moved.predict({}, 0), machine.predict({jump.name: shift}, 0)
     plain = machine.predict({}, 0)

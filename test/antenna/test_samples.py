@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from antenna_drive.diagnosis.field_recording import FieldRecording
-from antenna_drive.diagnosis.samples import slips, spikes
+from antenna_drive.diagnosis.sensors import slips, spikes
 from antenna_drive.parameters import load
 from antenna_drive.readings import SIGNALS
 from antenna_drive.recording.recording import Recording

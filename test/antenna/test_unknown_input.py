@@ -77,17 +77,9 @@ def test_evidence_is_that_of_a_normal_distribution() -> None:
     random = np.random.default_rng(1)
     columns = random.normal(size=(40, 6))
     residual = columns @ random.normal(size=6) * 1.5 + random.normal(size=40)
-    inputs = _Evidence(residual, np.ones(40), np.zeros((40, 1)), np.ones(1))
+    inputs = _Evidence(residual, 1.0, np.ones(40), np.zeros((40, 1)), np.ones(1))
 
-    class One:
-        """A problem of one experiment."""
-
-        @staticmethod
-        def rows(k: int) -> slice:
-            """Return all rows."""
-            return slice(0, 40)
-
-    evidence, *_ = inputs.weighed([columns], One())  # type: ignore[arg-type]
+    evidence, *_ = inputs.weighed([columns], [slice(0, 40)])
 
     def worst(size: FloatArray) -> float:
         spread = np.exp(size[0]) * (np.eye(40) + np.exp(size[1]) * columns @ columns.T)

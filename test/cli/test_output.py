@@ -126,10 +126,21 @@ def test_progress_of_work_that_fails() -> None:
 
 @pytest.mark.parametrize('stream, quiet', [(Terminal(), True), (io.StringIO(), False)])
 def test_progress_is_quiet(stream: io.StringIO, quiet: bool) -> None:
-    """Nothing is shown when told so, and nothing into a file or a pipe."""
+    """Nothing is shown when told so, and nothing of short work into a file or a pipe."""
     with Progress('steps', 4, quiet=quiet, stream=stream) as progress:
         progress.update(2)
     assert stream.getvalue() == ''
+
+
+def test_progress_in_a_log(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Long work has a line now and then, which no other overwrites."""
+    monkeypatch.setattr(Progress, 'LINE_S', 0.0)
+    log = io.StringIO()
+    with Progress('steps', 4, stream=log) as progress:
+        progress.update(2)
+    assert [line.split()[0] for line in log.getvalue().splitlines()] == ['steps'] * 2
+    assert ' 50 %' in log.getvalue()
+    assert '\r' not in log.getvalue()
 
 
 def test_progress_of_nothing() -> None:

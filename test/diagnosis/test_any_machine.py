@@ -13,8 +13,6 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 from simgap.machine.contract import Effect, Experiment, FloatArray, Form, Machine, Parameter, Point
-from simgap.next_test.rivals import Rival
-from simgap.settings import DEFAULT
 from simgap.verdict.diagnosis import diagnose
 from simgap.verdict.record import share_text
 
@@ -124,17 +122,6 @@ def test_an_effect_that_gains_very_much_is_named_though_its_interval_is_wide() -
     assert set(top['effects']) == {'load.creep', 'floor.wave'}
 
 
-def test_a_small_doubt_is_settled_by_what_an_effect_gains() -> None:
-    """The doubt of a tenth is left by the width of an interval; the waves end it, too."""
-    easier = DEFAULT.changed('interval.sure', 0.15).changed('interval.sure_of_partner', 0.15)
-    result = diagnose(Scale({'load.creep.size': 1.0, 'floor.wave.size': 0.05}),
-                      settings=easier).as_data()
-    creep = Rival.of_data(result['planning']['rivals'][0]).doubts['load.creep']
-    by_interval = replace(creep, gain=0.0).probability
-    assert 0.05 < by_interval < 0.5
-    assert result['which'][0]['probability'] > 1.0 - by_interval
-
-
 def test_an_effect_that_the_catalogue_lacks_is_unknown() -> None:
     body = Body({'heater.step.size': -0.3})
     whole, withheld = (diagnose(machine).as_data() for machine in (
@@ -143,57 +130,6 @@ def test_an_effect_that_the_catalogue_lacks_is_unknown() -> None:
                for result in (whole, withheld)]
     assert unknown[1] > unknown[0] + 0.5
     assert 'heater.step' in body.catalogue, 'the machine itself stays as it is'
-
-
-class Weather(Form):
-    """A course over time that is so free that it may be no weather, and here it is none."""
-
-    def implausibility(self, point: Point, deviations: Point) -> float:
-        """Return how little it looks like weather."""
-        return 3.0
-
-
-class BodyInWeather(Body):
-    """A body to which weather may do what the heater does, and a little more."""
-
-    def __init__(self, truth: Mapping[str, float]) -> None:
-        super().__init__(truth)
-        weather = Weather('', tuple(
-            Parameter(f'air.weather.{name}', 'K', -1.0, 1.0, 1e-3)
-            for name in ('step', 'wave')), is_course=True)
-        self.catalogue['air.weather'] = Effect(
-            'air.weather', 'air', 'a cause', 'a look', (weather,))
-
-    def predict(self, point: Point, experiment: int) -> FloatArray:
-        """Return what both thermometers say."""
-        return weathered(super().predict(point, experiment), point)
-
-
-def weathered(plain: FloatArray, point: Point) -> FloatArray:
-    weather = (point.get('air.weather.step', 0.0) * (TIME >= 4.0)
-               + point.get('air.weather.wave', 0.0) * np.sin(2.0 * TIME))
-    return plain + weather[:, np.newaxis]
-
-
-def of_weather(step: float, wave: float) -> BodyInWeather:
-    """Return a body that was recorded in such a course."""
-    body, point = BodyInWeather({}), {'air.weather.step': step, 'air.weather.wave': wave}
-    for experiment in body.experiments:
-        experiment.measured[:] = weathered(experiment.measured, point)
-    return body
-
-
-def test_what_explains_the_gap_without_an_implausible_course_is_named() -> None:
-    result = diagnose(of_weather(-0.3, 0.008)).as_data()
-    assert result['which'][0]['effects'] == ['heater.step']
-    assert result['which'][0]['probability'] > 0.9
-    assert 'air.weather fits best, as no real one would' in result['notes'][-1]
-
-
-def test_an_implausible_course_that_nothing_else_explains_is_unknown() -> None:
-    result = diagnose(of_weather(-0.3, 0.2)).as_data()
-    assert result['verdict'] == 'unknown_effect'
-    assert result['which'][1]['effects'] == ['air.weather']
 
 
 def noisier(body: Body, level: float, corner_hz: float, seed: int = 9) -> Body:
@@ -305,7 +241,6 @@ def test_what_closes_nothing_of_withheld_data_is_not_named() -> None:
     result = diagnose(body).as_data()
     assert result['verdict'] == 'unknown_effect'
     assert {name for entry in result['which'] for name in entry['effects']} == {'none', 'unknown'}
-    assert any(note.startswith('heater.step fits best') for note in result['notes'])
     assert result['statements']['named']['best_of_catalogue'] == []
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from simgap.errors import UserError
-from simgap.machine.check import check_machine, idle_effects, MachineError
+from simgap.machine.check import check_machine, idle_effects, MachineError, without
 from simgap.machine.contract import Effect, Experiment, FloatArray, Form, Machine, Parameter, Point
 from simgap.verdict.diagnosis import diagnose
 
@@ -77,6 +77,16 @@ def test_what_is_wrong_is_told_by_name(changes: Any, words: str) -> None:
     assert words in str(caught.value) and '\n' not in str(caught.value)
     # the command line shows it without a traceback
     assert isinstance(caught.value, UserError)
+
+
+def test_what_is_left_out_and_what_matters_has_to_be_there() -> None:
+    assert list(without(Shaft(), ['shaft.play'], ['angle']).catalogue) == []
+    for effects, limits, words in ((['shaft.pley'], [], 'shaft.pley: no such effect, did you mean '
+                                    'shaft.play?; there are shaft.play'),
+                                   ([], ['angel'], 'angel: no such signal, did you mean angle?')):
+        with pytest.raises(UserError) as caught:
+            without(Shaft(), effects, limits)
+        assert words in str(caught.value)
 
 
 def test_a_machine_in_order_passes() -> None:

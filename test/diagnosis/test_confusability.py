@@ -13,7 +13,7 @@ from simgap.settings import DEFAULT
 
 TIME: FloatArray = np.linspace(-1.0, 1.0, 400)
 STRONG = 1e6
-PRICE = DEFAULT.penalty.effect + DEFAULT.penalty.parameter
+PRICE = DEFAULT.evidence.shows
 CURVE = Parameter('body.curve.size', '1', -10.0, 10.0, 1e-3)
 SHIFT = Parameter('body.shift.size', 'm', -100.0, 100.0, 1e-3)
 

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from simgap.fit.least_squares import LeastSquares
 from simgap.machine.contract import Effect, Experiment, FloatArray, Form, Machine, Parameter, Point
-from simgap.next_test.rivals import Rival
 from simgap.search.hypothesis import Hypothesis
+from simgap.search.rival import Rival
 from simgap.search.search import Search
 
 TIME = np.arange(0.0, 30.0, 0.02)
@@ -59,10 +59,9 @@ def answer(*effects: str, form: str = '') -> Rival:
 
 def searched(*earlier: Rival) -> tuple[Hypothesis, float]:
     """Return what a search finds best, and its loss at the noise of the data sheet."""
-    search = Search(LeastSquares(String()), lambda share, doing: None, earlier=earlier)
-    _, singles, pairs = search.run()
-    best = min((*singles, *pairs), key=lambda h: search.problem.loss(h.state.residual))
-    return best, search.problem.scale ** 2 * search.problem.loss(best.state.residual)
+    problem = LeastSquares(String())
+    best = Search(problem, lambda share, doing: None, earlier=earlier).run().best
+    return best, problem.loss(problem.residuals(best.state.point()))
 
 
 def test_from_the_model_alone_the_search_sticks() -> None:

@@ -18,9 +18,10 @@ from simgap.next_test.candidate import Candidate
 from simgap.next_test.design import CRITERIA, DesignEffort, TestDesign
 from simgap.next_test.proposal import as_data, contents, lines
 from simgap.next_test.rival_fits import confirmed_separation
-from simgap.next_test.rivals import Findings, Rival
+from simgap.next_test.rivals import Findings
 from simgap.next_test.separation import Separation
 from simgap.next_test.space import TestSpace
+from simgap.search.rival import Rival
 from simgap.settings import DEFAULT
 
 SMALL = DesignEffort(drawn=8, judged=6, varied=2, variants=2, confirmed=2)
@@ -34,7 +35,7 @@ class Lever(Machine):
     one alone.
     """
 
-    def __init__(self, load: float, sigma: float = 0.01) -> None:
+    def __init__(self, load: float, sigma: float = 0.03) -> None:
         self.load = load
         super().__init__(
             [Experiment('next', np.linspace(0.0, 1.0, 60), ('y',), ('m',), np.zeros((60, 1)),
@@ -151,7 +152,7 @@ def test_what_is_confirmed_counts_in_full_though_its_family_broke_promises() -> 
 
 def _compound(test: Candidate, unlisted: float) -> float:
     assert test.confirmed is not None
-    told = test.confirmed.information(DEFAULT.verdict.temperature, DEFAULT.planning.caution)
+    told = test.confirmed.information(DEFAULT.planning.caution)
     return (1.0 - unlisted) * np.log(told) - unlisted * np.log(test.coarseness)
 
 
@@ -201,7 +202,7 @@ def test_a_sharpening_test_has_the_deviation_of_the_closed_form() -> None:
     # y = (1 + c) load sin: the information is load^2 n / 2 / sigma^2, and the prior's; the zero is
     # orthogonal to the sine but for the last sample
     swing = best.test * np.sin(2.0 * np.pi * np.linspace(0.0, 1.0, 60))
-    expected = (1.0 / 0.01 + float(swing @ swing) / 0.01 ** 2) ** -0.5
+    expected = (1.0 / 0.01 + float(swing @ swing) / 0.03 ** 2) ** -0.5
     before, after = best.deviations['lever.compliance']
     assert before == pytest.approx(0.1)
     assert after == pytest.approx(expected, rel=1e-3)
@@ -265,7 +266,7 @@ def test_of_tests_that_tell_the_rivals_apart_one_that_shows_more_is_proposed(see
     found = TestDesign(Heated(1.6), Findings(HARD), effort=SMALL, seed=seed).run()
     best, cold = found.tests[0], next(t for t in found.tests if not t.test[1])
     for test in (best, cold):
-        assert test.promised is not None and test.promised.expected(8.0) > 0.95
+        assert test.promised is not None and test.promised.expected() > 0.95
     assert best.test[1]
     # the expansion, one effect of four, counts as a thousand times too large in the cold
     assert cold.coarseness / best.coarseness == pytest.approx(1000.0 ** 0.25, rel=0.2)

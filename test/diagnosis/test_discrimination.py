@@ -14,9 +14,8 @@ import pytest
 from simgap.machine.contract import Effect, Experiment, FloatArray, Form, Machine, Parameter, Point
 from simgap.next_test.discrimination import separation
 from simgap.next_test.rival_fits import confirmed_separation
-from simgap.next_test.rivals import Rival
 from simgap.next_test.separation import Separation
-from simgap.verdict.doubts import Doubt
+from simgap.search.rival import Rival
 
 WIDE = 1e3
 
@@ -136,16 +135,18 @@ def test_the_order_of_rivals_changes_nothing(deviation: float) -> None:
     assert lack_of_silence(deviation, -1) == pytest.approx(lack_of_silence(deviation), rel=1e-6)
 
 
-def test_probabilities_after_a_test() -> None:
-    told = Separation(np.array([0.7, 0.3]), np.array([[0.0, 8.0], [16.0, 0.0]]))
-    first = 0.7 / (0.7 + 0.3 * math.exp(-1.0))
-    second = 0.3 / (0.3 + 0.7 * math.exp(-2.0))
-    assert told.posterior(8.0)[0, 0] == pytest.approx(first)
-    assert told.expected(8.0) == pytest.approx(0.7 * first + 0.3 * second)
-    assert told.information(8.0) == pytest.approx(
+@pytest.mark.parametrize('caution', [1.0, 8.0])
+def test_probabilities_after_a_test(caution: float) -> None:
+    told = Separation(np.array([0.7, 0.3]), np.array([[0.0, 1.0], [2.0, 0.0]]))
+    first = 0.7 / (0.7 + 0.3 * math.exp(-1.0 / caution))
+    second = 0.3 / (0.3 + 0.7 * math.exp(-2.0 / caution))
+    assert np.diag(told.posterior(caution)) == pytest.approx([first, second])
+    assert told.information(caution) == pytest.approx(
         0.7 * math.log(first / 0.7) + 0.3 * math.log(second / 0.3))
-    assert told.surely(8.0, 0.8) == pytest.approx(0.7)
-    assert told.least_lack()[0, 1] == 8.0
+    if caution == 1.0:
+        assert told.expected() == pytest.approx(0.7 * first + 0.3 * second)
+        assert told.surely(0.8) == pytest.approx(0.7)
+    assert told.least_lack()[0, 1] == 1.0
 
 
 def test_the_signals_that_tell_have_their_shares() -> None:
@@ -156,14 +157,8 @@ def test_the_signals_that_tell_have_their_shares() -> None:
 
 
 def test_a_rival_survives_its_file() -> None:
-    one = replace(rival('waves', TRUE, 0.02, 0.7), doubts={
-        'part.waves': Doubt('waves_0', 0.3, 0.1, 3.5, 20.0, 2000.0, 3.0)})
+    one = rival('waves', TRUE, 0.02, 0.7)
     back = Rival.of_data(json.loads(json.dumps(one.as_data())))
-    assert back.doubts == one.doubts
-    # a verdict of an earlier version has none
-    plain = one.as_data()
-    del plain['doubts']
-    assert Rival.of_data(plain).doubts == {}
     assert back.named == one.named and back.names == one.names
     assert back.point == one.point
     assert back.covariance == pytest.approx(one.covariance)
@@ -190,64 +185,3 @@ def test_the_digits_of_a_file_free_no_direction_and_hold_none(seed: int) -> None
     step = (c @ d) / (c @ c + s ** 2)
     lack = 0.5 * (np.sum((d - step * c) ** 2) / s ** 2 + step ** 2)
     assert found.lack[0, 1] == pytest.approx(lack, rel=1e-2)
-
-
-def doubted(size: float, deviation: float, known: float, gain: float = 0.0) -> list[Rival]:
-    """Return a rival that names a number, which is known so well, and one without it."""
-    # of the first number alone is anything known that a test could add to
-    effect = rival('waves', (size, 0.0, 0.0), 1e-6, 0.8)
-    effect = replace(effect, covariance=np.diag([known ** 2, 1e-12, 1e-12]), doubts={
-        'part.waves': Doubt('waves_0', abs(size) - 0.1, deviation, 3.5, gain, 2000.0, 3.0)})
-    return [effect, Rival((), (), (), 0.2, (), np.zeros(0), np.zeros((0, 0)))]
-
-
-def change_of_odds(before: Doubt, after: Doubt) -> float:
-    """Return by how much the odds of a doubt fall, as a logarithm."""
-    odds = [doubt.probability / (1.0 - doubt.probability) for doubt in (before, after)]
-    return math.log(odds[0] / odds[1])
-
-
-@pytest.mark.parametrize('known', [0.05, 0.02])
-def test_a_doubt_falls_as_the_verdict_will_see_the_deviation_shrink(known: float) -> None:
-    # n readings of noise s of a number that is known to within v; a part of its deviation does
-    # not follow from the readings, and stays
-    n, s, f, deviation = 400, 0.5, 1.7, 0.05
-    rivals = doubted(0.4, deviation, known)
-    found = separation(Curves(np.zeros(n), s), rivals, f)
-    after = math.sqrt(1.0 / (1.0 / known ** 2 + n / s ** 2 / f))
-    assert found.shrunk[0]['waves_0'] == pytest.approx(after / known, rel=1e-3)
-    doubt = rivals[0].doubts['part.waves']
-    rest = math.sqrt(deviation ** 2 - known ** 2)
-    wanted = change_of_odds(doubt, replace(doubt, deviation=math.hypot(rest, after)))
-    assert found.odds[0, 1] == pytest.approx(wanted, rel=1e-3)
-    # far more than that tells their fits apart
-    assert found.lack[0, 1] > 10.0 * wanted
-    assert found.evidence(1.0)[0, 1] == found.odds[0, 1]
-    kept = confirmed_separation(Curves(np.zeros(n), s), rivals, f, shrunk=found.shrunk)
-    assert kept.odds == pytest.approx(found.odds)
-
-
-def test_a_doubt_that_rests_on_the_gain_falls_with_the_gain() -> None:
-    rivals = doubted(0.4, 0.3, 1e-5, gain=1500.0)
-    found = separation(Curves(np.zeros(6000), 0.5), rivals, 1.0)
-    # at x = 0 the readings of the effect are 0.4 everywhere, and 0 without it
-    lack = 0.5 * 6000 * (0.4 / 0.5) ** 2
-    doubt = rivals[0].doubts['part.waves']
-    wanted = change_of_odds(doubt, replace(doubt, gain=1500.0 + lack))
-    assert found.odds[0, 1] == pytest.approx(wanted, rel=1e-3)
-    unknown = separation(Curves(np.zeros(6000), 0.5), doubted(0.4, 0.3, 1e-5), 1.0)
-    assert unknown.odds[0, 1] == pytest.approx(0.0, abs=1e-6)
-
-
-def test_a_rival_without_a_doubt_is_told_apart_by_its_fit_alone() -> None:
-    rivals = [replace(item, doubts={}) for item in doubted(0.4, 0.3, 0.1)]
-    found = separation(Curves(np.zeros(100), 0.5), rivals, 1.0)
-    assert (found.evidence(2.0) == found.lack / 2.0).all()
-
-
-def test_without_derivatives_no_deviation_is_said_to_shrink_less() -> None:
-    rivals = doubted(0.4, 0.05, 0.05)
-    machine = Curves(np.linspace(-1.0, 1.0, 50), 0.5)
-    rough = separation(machine, rivals, 1.0, follow=False)
-    assert 0.0 < rough.shrunk[0]['waves_0'] <= (
-        separation(machine, rivals, 1.0).shrunk[0]['waves_0'] * (1.0 + 1e-6))

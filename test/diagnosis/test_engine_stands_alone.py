@@ -19,7 +19,8 @@ ENGINE, DRIVE = (Path(house.__file__ or '').parent for house in (simgap, antenna
 EXAMPLES = Path(__file__).resolve().parents[2] / 'examples'
 # what importing the engine may load, and what is loaded only where it is needed
 ALWAYS = {'numpy', 'scipy'}
-LATE = {'threadpoolctl', 'yaml', 'jinja2', 'markupsafe', 'numba', 'mujoco', 'fmpy', 'pyarrow'}
+LATE = {'threadpoolctl', 'yaml', 'jinja2', 'markupsafe', 'numba', 'mujoco', 'fmpy', 'pyarrow',
+        'mcap', 'mcap_protobuf', 'rosbags', 'zstandard'}
 # of the antenna: `axis=` is numpy's, and a plot has axes
 MACHINE_WORDS = re.compile(r'antenna|motor_[12]|\baxis\b(?!=)|tach_|wind_gust|elevation')
 NOTICE = 'The antenna_drive authors'

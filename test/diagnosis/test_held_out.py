@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-import math
 from typing import Any
 
 from hypothesis import given, strategies as st
@@ -17,9 +16,7 @@ from simgap.machine.contract import (
     Colour, Effect, Experiment, FloatArray, Form, Machine, Nuisances, Parameter, Point,
 )
 from simgap.search.hypothesis import Hypothesis
-from simgap.search.training import Part, Slopes, trained
-from simgap.settings import DEFAULT
-from simgap.verdict.held_out import block_sums, explained_fraction, held_out, refuted, shows_no_gap
+from simgap.verdict.held_out import block_sums, explained_fraction, held_out
 
 TIME: FloatArray = np.arange(2000, dtype=np.float64) * 0.01
 SIZE = Parameter('spring.rate.size', '1', -10.0, 10.0, 1e-3)
@@ -87,41 +84,6 @@ def test_an_effect_that_turns_its_sign_explains_less_than_nothing_elsewhere() ->
     assert fraction['value'] == -1.0 and fraction['ci95'][1] < 0.0
 
 
-class Shared(Ramp):
-    """A ramp whose size is also the number of a tolerance, which the effect takes over."""
-
-    tolerance = Parameter('tolerance', '1', -0.1, 0.1, 1e-3)
-
-    def predict(self, point: Point, experiment: int) -> FloatArray:
-        """Return the ramp."""
-        whole = point.get(SIZE.name, 0.0) + point.get('tolerance', 0.0)
-        return super().predict({**point, SIZE.name: whole}, experiment)
-
-    def __init__(self, truths: Sequence[float]) -> None:
-        super().__init__(truths)
-        self.nuisances = SharedNumbers(self.nuisances)
-
-
-class SharedNumbers(Nuisances):
-    """Nuisances whose tolerance an effect takes over."""
-
-    def take_over(self, point: Point, forms: Sequence[Form]) -> tuple[dict[str, float], set[str]]:
-        """Return a point at which the effect alone stands for the number."""
-        if SIZE.name not in point:
-            return dict(point), set()
-        return {**point, SIZE.name: point[SIZE.name] + point['tolerance'], 'tolerance': 0.0}, set()
-
-
-def test_what_a_tolerance_has_of_an_effect_in_training_is_the_effect() -> None:
-    problem = LeastSquares(Shared([0.37, 0.37, 0.37]))
-    free = [ZERO, Shared.tolerance]
-    none = Hypothesis((), (), problem.fit(problem.start(free, {}), 20))
-    best = problem.fit(problem.start([*free, SIZE], {}), 20)
-    found = held_out(problem, none, Hypothesis((EFFECT.id,), EFFECT.forms, best))
-    assert [fold['values'][SIZE.name] for fold in found['folds']] == pytest.approx(
-        [0.37] * 3, abs=1e-3)
-
-
 class Thrown(Ramp):
     """A ramp after a start that has two sides: from 0 no gradient leads to the true one."""
 
@@ -165,25 +127,6 @@ def test_a_share_names_the_effects_that_it_is_of() -> None:
     assert found['explained_fraction']['value'] == pytest.approx(1.0, abs=1e-3)
 
 
-def test_only_what_could_be_judged_in_full_is_refuted() -> None:
-    turned = judged(Ramp([0.5, -0.5]))
-    assert refuted(turned)
-    assert not refuted(judged(Ramp([0.5, 0.5])))
-    assert not refuted(judged(Ramp([0.5, 0.5], shows=(1.0, 0.0))))
-    turned['folds'][0]['cannot_be_judged'] = {'spring.damping': 'its numbers belong to one test'}
-    assert not refuted(turned)
-
-
-@pytest.mark.parametrize('value, interval, expected', [
-    (0.0, [0.0, 1.0], True),     # withheld data have no gap: nothing is to be explained
-    (-0.1, [-0.6, 0.4], True), (0.1, [-0.4, 0.6], False), (None, [None, None], False)])
-def test_the_share_itself_refutes_not_its_interval(
-        value: float | None, interval: list[float | None], expected: bool) -> None:
-    reach = {'explained_fraction': {'value': value, 'ci95': interval},
-             'folds': [{'judged': ['a'], 'cannot_be_judged': {}}]}
-    assert refuted(reach) == expected
-
-
 def test_an_exact_correction_explains_all_within_its_interval() -> None:
     """Here a fit without noise ends at the truth; with it, the interval reaches one."""
     fraction = judged(Ramp([0.5, 0.5, 0.5]))['explained_fraction']
@@ -198,8 +141,6 @@ def test_what_the_whole_data_gave_is_not_used(found: float) -> None:
     machine = Ramp([0.5, 0.5, -0.2])
     usual, other = judged(machine), judged(machine, found)
     assert other['after'] == pytest.approx(usual['after'], rel=1e-6)
-    assert other['training_began_at'] == [
-        {'effect': 'spring.rate', 'form': '', 'values': {'spring.rate.size': 0.0}}]
 
 
 def test_what_training_does_not_see_is_not_judged_there() -> None:
@@ -254,20 +195,16 @@ class Valleys(Ramp):
 
 
 @pytest.mark.parametrize('truth', [-2.0, 1.0])
-def test_what_a_training_in_a_local_minimum_taught_is_not_judged(truth: float) -> None:
+def test_training_stays_on_the_side_that_all_tests_tell(truth: float) -> None:
     """
     A slope of 2.25 has a size of 1 or -2. From 0 and the slope alone, a fit goes to 1.
 
-    Only a training with the first test is led to -2 by its ripple.
+    Only the first test says by its ripple that it is -2.
     """
     found = judged(recorded(Valleys([0.0, 0.0, 0.0]), {SIZE.name: truth}), truth)
-    stuck = {'spring.rate': 'the fit to the training data stopped in a local minimum'}
-    assert [fold['cannot_be_judged'] for fold in found['folds']] == [
-        stuck if truth < 0.0 else {}, {}, {}]
-    assert [fold['values'].get(SIZE.name) for fold in found['folds'][1:]] == pytest.approx(
-        [truth, truth], abs=1e-2)
+    assert [fold['values'].get(SIZE.name) for fold in found['folds']] == pytest.approx(
+        [truth] * 3, abs=1e-2)
     assert found['explained_fraction']['value'] == pytest.approx(1.0, abs=1e-3)
-    assert not refuted(found)
 
 
 class Placed(Ramp):
@@ -285,28 +222,16 @@ class Placed(Ramp):
                           + 0.1 * size * zero * np.sin(3.0 * TIME))[:, None]
 
 
-@pytest.mark.parametrize('passes, wanting, can_judge', [
-    (0, math.inf, False), (4, math.inf, True), (0, DEFAULT.search.wanting, True)])
-def test_initial_conditions_are_chosen_again_where_a_training_has_stopped_short(
-        passes: int, wanting: float, can_judge: bool) -> None:
-    """
-    At no size both places are alike, and the first is taken. The truth is the second.
-
-    All sizes that are tried out before a fit are far too great. Further passes find the place, and
-    so does a fit that one test leads, which is made where much is left.
-    """
+def test_a_place_that_only_the_size_tells_is_that_of_the_fit_to_all_tests() -> None:
+    """At no size both places are alike, and the first is taken. The truth is the second."""
     truth = {SIZE.name: 1.0, 'zero': -0.5}
     size = replace(SIZE, low=-1e4, high=1e4)
-    problem = LeastSquares(recorded(Placed([0.0] * 3, shows=[0.008] * 3), truth),
-                           settings=DEFAULT.changed('held_out.further_passes', passes).changed(
-                               'search.wanting', wanting))
+    problem = LeastSquares(recorded(Placed([0.0] * 3, shows=[0.008] * 3), truth))
     found = held_out(
         problem, Hypothesis((), (), problem.fit(problem.start([ZERO], {}), 20)),
         Hypothesis((EFFECT.id,), (Form('', (size,)),), problem.start([ZERO, size], truth)))
-    assert [fold['judged'] for fold in found['folds']] == [
-        ['spring.rate'] if can_judge else []] * 3
-    if can_judge:
-        assert found['explained_fraction']['value'] == pytest.approx(1.0, abs=0.02)
+    assert [fold['judged'] for fold in found['folds']] == [['spring.rate']] * 3
+    assert found['explained_fraction']['value'] == pytest.approx(1.0, abs=0.02)
 
 
 class Burst(Ramp):
@@ -325,8 +250,7 @@ def test_the_offsets_of_a_withheld_test_leave_a_local_minimum() -> None:
     """
     A zero of -0.9 makes the burst. From 0, a fit goes to the upper bound, which is too near.
 
-    Only training without the last test has no burst to be led astray by. A robust level of what
-    is left hardly sees the ten readings.
+    A robust level of what is left hardly sees the ten readings.
     """
     zero = Parameter('zero', '1', -1.0, 0.5, 1e-3, 0.5)
     truth = {SIZE.name: 0.5, 'zero': -0.9}
@@ -334,7 +258,7 @@ def test_the_offsets_of_a_withheld_test_leave_a_local_minimum() -> None:
     found = held_out(
         problem, Hypothesis((), (), problem.fit(problem.start([zero], {}), 20)),
         Hypothesis((EFFECT.id,), EFFECT.forms, problem.start([zero, SIZE], truth)))
-    assert [fold['judged'] for fold in found['folds']] == [[], [], ['spring.rate']]
+    assert [fold['judged'] for fold in found['folds']] == [['spring.rate']] * 3
     assert found['after'] == pytest.approx(1.0, abs=0.03)
     assert found['explained_fraction']['value'] == pytest.approx(1.0, abs=1e-3)
 
@@ -408,7 +332,7 @@ def test_a_missing_reading_is_no_evidence() -> None:
 
 @given(st.floats(1.0, 1e6), st.floats(0.0, 1e6), st.floats(0.1, 1e3))
 def test_no_more_than_all_is_explained(before: float, after: float, noise: float) -> None:
-    fraction = explained_fraction(np.array([before, after, noise]), 1e-3)
+    fraction = explained_fraction(np.array([before, after, noise]))
     assert fraction <= 1.0 + 1e-12
     if after <= noise and before > 1.1 * noise:
         assert fraction == pytest.approx(1.0)
@@ -423,55 +347,6 @@ def test_blocks_hold_the_energy_of_their_seconds() -> None:
     assert sums.shape == (20, 3)
     np.testing.assert_allclose(sums[0], [4.0 * 50, 50.0, 50.0])
     np.testing.assert_allclose(sums[1:], np.tile([400.0, 100.0, 100.0], (19, 1)))
-
-
-class Wave(Machine):
-    """A wave along an angle, bent so that it has no derivative at no size; it notes its points."""
-
-    angles = (40.0 * TIME / TIME[-1], 25.0 * (1.0 - np.cos(0.4 * TIME)))
-
-    def __init__(self, is_shape: bool) -> None:
-        self.points: list[dict[str, float]] = []
-        self.form = Form('', (
-            Parameter('wave.size.sine', 'm', -5.0, 5.0, 1e-3),
-            Parameter('wave.size.cosine', 'm', -5.0, 5.0, 1e-3),
-            Parameter('wave.size.change', '1', -0.03, 0.03, 1e-4, is_shape=is_shape)))
-        true = {'wave.size.sine': 0.7, 'wave.size.cosine': -0.9, 'wave.size.change': 1e-3}
-        noise = 0.02 * np.random.default_rng(1).normal(size=(2, TIME.size, 1))
-        super().__init__(
-            [Experiment(f'test {k}', TIME, ('y',), ('m',), self.predict(true, k) + noise[k],
-                        np.full((TIME.size, 1), 0.02)) for k in (0, 1)], [ZERO],
-            [Effect('wave.size', 'wave', '', '', (self.form,))])
-        self.true = true
-
-    def predict(self, point: Point, experiment: int) -> FloatArray:
-        """Return the wave."""
-        self.points.append(dict(point))
-        phase = 8.0 * (1.0 + point.get('wave.size.change', 0.0)) * self.angles[experiment]
-        wave = (point.get('wave.size.sine', 0.0) * np.sin(phase)
-                + point.get('wave.size.cosine', 0.0) * np.cos(phase))
-        return np.asarray(wave * np.abs(wave) + point.get('zero', 0.0))[:, None]
-
-
-@pytest.mark.parametrize('is_shape', [True, False])
-def test_training_finds_the_sizes_before_it_turns_a_shape(is_shape: bool) -> None:
-    """A derivative by the order of a wave means nothing as long as its sizes are wrong."""
-    machine = Wave(is_shape)
-    part, problem = Part(machine, [0, 1]), LeastSquares(machine)
-    parameters = (ZERO, *machine.form.parameters)
-    state = problem.start(parameters, machine.true)
-    given = Slopes.of(problem, state).for_part(part, parameters)
-    # of what is missing at the start, a wrong order seems to be the reason
-    given[:, -1] = 1e3 * (problem.residuals({}) - state.residual)
-    machine.points.clear()
-    trained(part, parameters, {}, [given], DEFAULT)
-    early = []
-    for point in machine.points:
-        if 'wave.size.sine' in point:
-            if abs(point['wave.size.sine'] - 0.7) + abs(point['wave.size.cosine'] + 0.9) < 0.4:
-                break
-            early.append(abs(point['wave.size.change']))
-    assert (max(early) == 0.0) == is_shape
 
 
 class Zeros(Machine):
@@ -495,5 +370,3 @@ def test_what_no_test_shows_alone_cannot_be_judged_on_one() -> None:
     found = judged(Zeros())
     fraction = found['explained_fraction']
     assert fraction['value'] is None and 'alone shows no gap' in fraction['reason']
-    assert shows_no_gap(found, DEFAULT) and not refuted(found)
-    assert not shows_no_gap(judged(Ramp([0.5, 0.5])), DEFAULT)

@@ -10,10 +10,9 @@ import numpy as np
 import pytest
 from simgap.fit.least_squares import LeastSquares
 from simgap.machine.contract import Experiment, FloatArray, Machine, Parameter, Point
-from simgap.search.hypothesis import Hypothesis
-from simgap.settings import DEFAULT
-from simgap.verdict.lack_of_fit import lack_of_fit
-from simgap.verdict.verdict import LackOfFit, unknown_probability
+from simgap.verdict.diagnosis import diagnose
+from simgap.verdict.lack_of_fit import enough, residual_tests
+from simgap.verdict.record import Verdict
 
 TIME: FloatArray = np.arange(4000, dtype=np.float64) * 0.01
 # a period of eight samples: one of the first lags is a whole period
@@ -34,43 +33,48 @@ class Still(Machine):
         return np.full((TIME.size, 1), point.get('zero', 0.0))
 
 
-def left(noise: float, wave: float, quantised: tuple[str, ...] = ()) -> LackOfFit:
-    """Return what is left of noise and a wave of these rms, in deviations of the stated noise."""
+def left(noise: float, wave: float, quantised: tuple[str, ...] = ()) -> Verdict:
+    """Return the verdict on noise and a wave of these rms, in deviations of the stated noise."""
     seen = noise * np.random.default_rng(3).normal(size=TIME.size) + wave * WAVE
-    problem = LeastSquares(Still(seen, quantised))
-    state = problem.fit(problem.start(problem.machine.nuisances, {}), 5)
-    return lack_of_fit(problem, problem.residuals({}), Hypothesis((), (), state), None)
+    return diagnose(Still(seen, quantised))
 
 
-def unknown(lack: LackOfFit) -> float:
-    return unknown_probability(lack, DEFAULT.verdict)
+def unknown(verdict: Verdict) -> float:
+    [found] = [answer.probability for answer in verdict.which if answer.effects == ['unknown']]
+    return found
 
 
 @pytest.mark.parametrize('noise, wave', [(0.4, 0.9), (0.5, 1.2), (1.0, 0.5), (0.9, 0.3)])
 def test_a_wave_counts_by_its_share_of_what_is_left(noise: float, wave: float) -> None:
     """The autocorrelation at a whole period is the wave's share of the power."""
     share = wave ** 2 / (noise ** 2 + wave ** 2)
-    found = left(noise, wave)
-    assert found.regular == pytest.approx(
-        share * min(1.0, noise ** 2 + wave ** 2), abs=0.03)
-    assert found.most_regular == 'seen'
+    seen = noise * np.random.default_rng(3).normal(size=TIME.size) + wave * WAVE
+    problem = LeastSquares(Still(seen))
+    tests = residual_tests(problem, problem.start(problem.machine.nuisances, {}))
+    assert tests['signals']['seen']['greatest_correlation'] == pytest.approx(share, abs=0.03)
+    assert tests['signals']['seen']['rms'] == pytest.approx(math.hypot(noise, wave), rel=0.03)
 
 
 def test_a_hum_no_louder_than_noise_may_be_is_unknown() -> None:
     """The sensor of the sheet is as loud as the hum, so its loudness tells nothing."""
-    hum = left(0.4, 0.9)
-    assert hum.fast < DEFAULT.verdict.fast and unknown(hum) > 0.7
+    assert unknown(left(0.4, 0.9)) > 0.7
     assert unknown(left(1.0, 0.0)) < 0.1
-    assert unknown(left(1.0, 0.5)) < 0.1
+    assert unknown(left(1.0, 0.4)) < 0.1
 
 
 def test_what_is_quieter_than_noise_is_no_gap() -> None:
     """A recording without noise leaves rounding and a model's last digits, which are regular."""
     quiet = left(0.01, 0.2)
-    assert quiet.regular < 0.05
-    assert unknown(quiet) < 0.15
+    assert quiet.word == 'no_gap' and unknown(quiet) < 0.15
 
 
 def test_a_digit_is_no_hum() -> None:
-    lack = left(0.1, 1.0, quantised=('seen',))
-    assert lack.regular == 0.0 and lack.left == 0.0 and unknown(lack) < 0.1
+    verdict = left(0.1, 1.0, quantised=('seen',))
+    assert verdict.residual_tests['excess_over_noise'] == 0.0 and unknown(verdict) < 0.1
+
+
+def test_few_samples_of_a_signal_are_not_enough() -> None:
+    machine = Still(WAVE)
+    assert enough(LeastSquares(machine))
+    machine.experiments[0].measured[50:] = np.nan
+    assert not enough(LeastSquares(machine))

@@ -16,9 +16,7 @@ from scipy.optimize import lsq_linear
 from simgap.fit.box_qp import box_constrained_step, BoxQuadratic
 from simgap.fit.least_squares import LeastSquares
 from simgap.fit.robust_loss import robust_loss, robust_weight
-from simgap.fit.starts import led, settled
 from simgap.machine.contract import Effect, Experiment, FloatArray, Form, Machine, Parameter, Point
-from simgap.settings import DEFAULT
 
 OFFSET = Parameter('offset', '1', -1.0, 1.0, 1e-3, 0.5)
 RATE = Parameter('rate', '1', 0.0, 3.0, 1e-3)
@@ -79,57 +77,6 @@ def test_fresh_derivatives_are_local_where_the_usual_step_is_long() -> None:
     fresh = problem.refreshed(state)
     np.testing.assert_allclose(fresh.jacobian[:, 1], exact, atol=0.01 * np.abs(exact).max())
     assert np.array_equal(fresh.x, state.x)
-
-
-class Vibrating(Machine):
-    """Tests of one frequency [Hz]: each reads a sine over 30 s, or the frequency itself."""
-
-    def __init__(self, frequencies: tuple[float, ...], kinds: tuple[str, ...]) -> None:
-        """Measure each test with its own true frequency, with known noise."""
-        noise, random = 0.1, np.random.default_rng(2)
-        self._kinds, self._time = kinds, np.linspace(0.0, 30.0, 600)
-        super().__init__(
-            [Experiment(kind, self._time, ('y',), ('1',),
-                        self._reading(kind, f) + noise * random.normal(size=(600, 1)),
-                        np.full((600, 1), noise)) for kind, f in zip(kinds, frequencies)],
-            [Parameter('frequency', 'Hz', 0.1, 5.0, 1e-4, 2.0)], [])
-
-    def _reading(self, kind: str, frequency: float) -> FloatArray:
-        if kind == 'sine':
-            return np.asarray(np.sin(2.0 * np.pi * frequency * self._time))[:, np.newaxis]
-        return np.full((600, 1), frequency)
-
-    def predict(self, point: Point, experiment: int) -> FloatArray:
-        """Return the closed form."""
-        return self._reading(self._kinds[experiment], point['frequency'])
-
-
-def test_a_smooth_test_leads_a_fit_out_of_a_local_minimum() -> None:
-    """A sine over thirty periods has a minimum for each whole period more or less."""
-    for order in (('sine', 'sine', 'level'), ('level', 'sine', 'sine')):
-        problem = LeastSquares(Vibrating((1.0, 1.0, 1.0), order))
-        start = problem.start(problem.machine.nuisances, {'frequency': 1.37})
-        stuck = settled(problem, problem.fit(start), DEFAULT.search, 5, 10)
-        assert abs(stuck.value('frequency') - 1.0) > 0.1
-        found = led(problem, stuck, DEFAULT.search)
-        assert found.value('frequency') == pytest.approx(1.0, abs=1e-3)
-        # what is left is noise of the size that was put in
-        assert found.cost == pytest.approx(0.5 * problem.samples, rel=0.1)
-
-
-def test_a_fit_that_one_test_would_lead_astray_stays_as_it_is() -> None:
-    problem = LeastSquares(Vibrating((1.0, 1.0, 1.4), ('sine', 'sine', 'level')))
-    start = problem.start(problem.machine.nuisances, {'frequency': 1.01})
-    right = settled(problem, problem.fit(start), DEFAULT.search, 5, 10)
-    assert right.value('frequency') == pytest.approx(1.0, abs=0.02)
-    assert led(problem, right, DEFAULT.search).cost <= right.cost
-    assert led(problem, right, DEFAULT.search).value('frequency') == pytest.approx(1.0, abs=0.02)
-
-
-def test_a_single_test_leads_nothing() -> None:
-    problem = LeastSquares(Vibrating((1.0,), ('sine',)))
-    state = problem.start(problem.machine.nuisances, {'frequency': 1.37})
-    assert led(problem, state, DEFAULT.search) is state
 
 
 def test_derivatives_of_a_staircase_step_over_its_treads() -> None:

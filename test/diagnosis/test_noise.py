@@ -14,7 +14,7 @@ import pytest
 from scipy.linalg import cholesky, solve_triangular, toeplitz
 from scipy.signal import lfilter
 from simgap.fit.noise import (
-    estimated, found_noise, Process, same_noise, whitened, with_estimated_noise, with_found_noise,
+    estimated, found_noise, Process, whitened, with_estimated_noise, with_found_noise,
     with_model_error,
 )
 from simgap.machine.contract import Colour, Experiment, FloatArray
@@ -98,8 +98,6 @@ def test_noise_of_an_experiment_is_taken_by_channel() -> None:
     [found] = with_estimated_noise([item], [residual], SETTINGS)
     assert found.colours[0].level == pytest.approx(2.0, rel=0.05)
     assert found.colours[1] == Colour(), 'a quantised reading has no noise of its own'
-    assert not same_noise(found, item, SETTINGS)
-    assert same_noise(found, replace(found), SETTINGS)
 
 
 @given(st.floats(0.1, 10.0), st.floats(0.01, 10.0), st.floats(0.0, 0.99))

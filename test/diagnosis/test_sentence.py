@@ -104,9 +104,19 @@ def test_a_narrow_interval_needs_no_reason() -> None:
     assert 'interval' not in said(verdict('explained', named)).sure
 
 
+def test_a_number_at_the_end_of_its_range_is_said_to_be_there() -> None:
+    named = replace(FOUND, parameters={GAP.name: {
+        'value': GAP.high, 'ci95': [0.9, 1.0], 'unit': 'rad'}})
+    assert ('Gap is at the end of its range: widen it, or doubt the model.'
+            in said(verdict('explained', named)).sure)
+    assert 'end of its range' not in said(verdict('explained')).sure
+
+
 def test_an_effect_that_widens_the_gap_is_not_said_to_remove_it() -> None:
     far = {'judged': FOUND.effects, 'explained_fraction': {'value': -3.0, 'ci95': [-9.0, 0.1]}}
     assert 'makes the gap wider' in str(said(verdict('explained', how_far=far)))
+    assert headline(verdict('explained', how_far=far)) == (
+        'named, but it closes nothing of data that was not fitted')
     unjudged = {'judged': [], 'explained_fraction': {'value': None, 'reason': 'one test'}}
     assert 'Adding' not in str(said(verdict('explained', how_far=unjudged)))
 
@@ -119,6 +129,8 @@ def test_agreement_is_not_said_beside_a_remainder_that_is_louder_than_noise() ->
     assert 'agree' not in found
     assert headline(verdict('no_gap', none, remains=LOUD)) == 'no effect named'
     assert headline(verdict('no_gap', none)) == 'no gap'
+    assert headline(verdict('explained')) == 'explained'
+    assert headline(verdict('explained', remains=LOUD)) == 'explained, but something remains'
     assert 'what remains of angle is 0.05 rad beyond noise of 0.01 rad' in found
     # what a user says does not matter is no reason to doubt
     asked = {'angle': {**LOUD['angle'], 'matters': False}}

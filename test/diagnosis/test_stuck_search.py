@@ -58,10 +58,9 @@ class String(Machine):
 
 @pytest.mark.parametrize('tests', [('heard', 'dial'), ('dial', 'heard')])
 def test_an_effect_that_one_test_shows_is_fitted_to_it_first(tests: tuple[str, ...]) -> None:
-    search = Search(LeastSquares(String(0.23, tests)), lambda share, doing: None)
-    _, singles, _ = search.run()
-    assert singles[0].effects == ('string.tension',)
-    assert singles[0].values[0][1] == pytest.approx(0.23, abs=1e-3)
+    found = Search(LeastSquares(String(0.23, tests)), lambda share, doing: None).run()
+    assert found.best.effects == ('string.tension',)
+    assert found.best.values[0][1] == pytest.approx(0.23, abs=1e-3)
     # what is left is noise of the size that was put in
-    assert search.problem.loss(singles[0].state.residual) == pytest.approx(
+    assert found.problem.loss(found.best.state.residual) == pytest.approx(
         0.5 * len(tests) * TIME.size, rel=0.1)

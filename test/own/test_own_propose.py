@@ -17,7 +17,8 @@ import simgap
 from simgap.model import effect, Log, Model, ModelError, own_tests, read_log, size
 from simgap.next_test.design import DesignEffort, TestDesign
 from simgap.next_test.investigation import DECIDED, InvestigationPlan
-from simgap.next_test.rivals import Findings, Rival
+from simgap.next_test.rivals import Findings
+from simgap.search.rival import Rival
 
 SMALL = DesignEffort(drawn=6, judged=4, varied=1, variants=1, confirmed=1)
 
@@ -56,7 +57,7 @@ def test_the_limit_of_a_reading_is_kept() -> None:
     best = found.tests[0]
     assert best.test.constants['height'] <= SMALL.margin * 1.5
     assert found.refused == {'angle': sum(found.refused.values())}
-    assert best.confirmed is not None and best.confirmed.expected(8.0) > 0.99
+    assert best.confirmed is not None and best.confirmed.expected() > 0.99
 
 
 def test_readings_of_a_planned_test_have_the_errors_of_a_model() -> None:

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 import runpy
 from typing import Any
@@ -47,6 +48,18 @@ def test_the_fault_of_a_joint_is_named_with_its_size(fault: str, effect: str, nu
     first = diagnose_logs(MODEL, logs_of(fault)).which[0]
     assert first.effects == [effect]
     assert first.parameters[f'{effect}.{number}']['value'] == pytest.approx(size, rel=0.1)
+
+
+@pytest.mark.parametrize('fault', [
+    pytest.param('nothing', marks=pytest.mark.slow),
+    pytest.param('asymmetry', marks=pytest.mark.slow),
+    *(pytest.param(fault, marks=pytest.mark.trial) for fault in ('backlash', 'ripple', 'delay'))])
+def test_an_answer_does_not_turn_with_the_rate_at_which_samples_are_compared(fault: str) -> None:
+    answers = [diagnose_logs(replace(MODEL, judged_hz=rate), logs_of(fault)).which[0]
+               for rate in (10.0, 20.0, 50.0, 200.0, 1000.0)]
+    assert len({tuple(answer.effects) for answer in answers}) == 1
+    probabilities = [answer.probability for answer in answers]
+    assert max(probabilities) - min(probabilities) < 0.1
 
 
 def test_what_a_repair_changes_is_told_and_what_it_leaves_too() -> None:

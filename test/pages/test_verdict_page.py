@@ -125,8 +125,7 @@ def test_everything_is_said_and_nothing_is_taken_for_html(browser: Page, tmp_pat
                   'Turn it by hand.', '3 s of computing', 'a bent needle',
                   f'data that was not fitted: {HOSTILE}.', 'matters',
                   'could be and still hide here', 'dial 12 samples: too few to judge',
-                  f'not worth a name: {HOSTILE} (1.2 % of the gap), '
-                  'dial.gain (not surely beyond its tolerance).'):
+                  f'not worth a name: {HOSTILE} (1.2 % of the gap)'):
         assert words in text, words
     assert 'Hold one rate.' not in text and '0.0 % none' not in text
     # every text of the made-up recording's that can be seen, and the script's data

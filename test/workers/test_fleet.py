@@ -85,9 +85,11 @@ def test_what_a_machine_is(fleet: Path) -> None:
     bag = fleet / 'north' / 'rec_c'
     bag.mkdir()
     (bag / 'rec_c_0.mcap').write_bytes(b'')
+    (fleet / 'north' / 'rec_d').mkdir()
+    (fleet / 'north' / 'rec_d' / 'rec_d_0.db3').write_bytes(b'')
     found = {machine.name: [path.name for path in machine.recordings]
              for machine in machines_of(fleet)}
-    assert found == {'east': ['east.csv'], 'north': ['rec_a.csv', 'rec_b.csv', 'rec_c'],
+    assert found == {'east': ['east.csv'], 'north': ['rec_a.csv', 'rec_b.csv', 'rec_c', 'rec_d'],
                      'south': ['rec_a.csv'], 'west': ['west_a.csv', 'west_b.csv']}
     (fleet / 'north_a.csv').write_text('')
     with pytest.raises(UserError, match='north: a subfolder and a group'):

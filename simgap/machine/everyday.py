@@ -1,0 +1,223 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+A machine with a little of each effect, as every machine has it.
+
+No size is exactly zero. Up to the tolerance of its catalogue an effect is no fault, but it shows,
+and what shows and has no name would be taken for another effect. So each has a nuisance of its own
+within the tolerance, whose prior is its everyday size. What so little does is linear in the size:
+its derivative is taken once, at the model as configured and again at the best answer, and such a
+nuisance costs no run.
+"""
+
+from collections.abc import Collection, Iterator, Sequence
+from copy import copy
+from dataclasses import dataclass
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from simgap.machine.arrays import Course, FloatArray, Point
+from simgap.machine.catalogue import Catalogue
+from simgap.machine.effect import Effect, Form, Parameter
+from simgap.machine.experiment import Experiment
+from simgap.machine.machine import DisturbanceInput, Machine
+from simgap.machine.motion import Motion, TimeScales
+
+# The standard deviation of an everyday size, as a share of the tolerance.
+EVERYDAY = 0.5
+_PREFIX = 'everyday:'
+
+
+def with_everyday(machine: Machine) -> Machine:
+    """Return a machine with everyday sizes; itself if no effect has one that is not a nuisance."""
+    neutral = machine.simulate([{}])[0]
+    residuals = [e.measured - predicted for e, predicted in zip(
+        machine.experiments, neutral, strict=True) if predicted is not None]
+    sizes: dict[str, _Size] = {}
+    for effect, form in _forms(machine, residuals):
+        for p in _sizes(machine, form):
+            # of forms that are alike near zero the first one stands for all
+            sizes.setdefault(p.name, _Size(p, form, effect))
+    if not sizes:
+        return machine
+    found = tuple(sizes.values())
+    return _Everyday(machine, found, _responses(machine, found, {}))
+
+
+@dataclass(frozen=True)
+class _Size:
+    """A size of an effect that everyday machines have."""
+
+    parameter: Parameter
+    form: Form
+    effect: Effect
+
+    def besides(self, point: Point, catalogue: Catalogue) -> Point:
+        """Return a point without the effect's other forms, which exclude this one."""
+        own = self.form.start
+        others = tuple(f'{effect.id}.' for effect in catalogue.values()
+                       if self.effect.id in (effect.id, *effect.parts))
+        return {name: value for name, value in point.items()
+                if name in own or not name.startswith(others)}
+
+
+def _responses(machine: Machine, sizes: Sequence[_Size],
+               point: Point) -> list[NDArray[np.floating[Any]]]:
+    """Return the derivatives by sizes, with the shapes of their forms, at a point."""
+    bases = [size.besides(point, machine.catalogue) for size in sizes]
+    unlike = {frozenset(base): base for base in bases}
+    steps, stepped = [], []
+    for size, base in zip(sizes, bases, strict=True):
+        p, at = size.parameter, base.get(size.parameter.name, 0.0)
+        steps.append(p.step if at + p.step <= p.high else -p.step)
+        stepped.append({**size.form.start, **base, p.name: at + steps[-1]})
+    rows = machine.low_fidelity().simulate([*unlike.values(), *stepped])
+    before = dict(zip(unlike, rows, strict=False))
+    return [np.stack([
+        np.nan_to_num((row[k] - before[frozenset(base)][k]) / step).ravel()  # type: ignore
+        for step, base, row in zip(steps, bases, rows[len(unlike):], strict=True)], axis=-1)
+        for k in range(len(machine.experiments))]
+
+
+def everyday_of(name: str) -> str:
+    """Return the size, by the name of its nuisance; empty for another nuisance."""
+    return name.removeprefix(_PREFIX) if name.startswith(_PREFIX) else ''
+
+
+def taken_over(catalogue: Catalogue, effect: str, form: Form, point: Point) -> dict[str, float]:
+    """Return a point in which the sizes of an effect begin at what its everyday sizes had."""
+    # the two do the same, and a fit does not find from one to the other
+    found = dict(point)
+    for p, names in alike(catalogue, effect, form):
+        had = [found.get(name, 0.0) for name in names]
+        if any(had) and not p.is_shape:
+            found.update(dict.fromkeys(names, 0.0))
+            found[p.name] = min(max(sum(had) / len(had), p.low), p.high)
+    return found
+
+
+def alike(catalogue: Catalogue, effect: str, form: Form) -> Iterator[tuple[Parameter, list[str]]]:
+    """Yield the numbers of an effect, each with the names of everyday sizes that do the same."""
+    whole = catalogue[effect]
+    forms = [catalogue.counterpart(form, whole, catalogue[part]) for part in whole.parts] or [form]
+    for p, *own in zip(form.parameters, *(own.parameters for own in forms), strict=True):
+        yield p, [_PREFIX + item.name for item in own]
+
+
+def as_configured(machine: Machine) -> Machine:
+    """Return the machine without everyday sizes."""
+    return machine.inner if isinstance(machine, _Everyday) else machine
+
+
+def _forms(machine: Machine, residuals: Sequence[FloatArray]) -> Iterator[tuple[Effect, Form]]:
+    for effect in machine.catalogue.values():
+        # what acts in several places acts in each of them
+        if not effect.parts:
+            for form in machine.catalogue.forms(effect, machine.experiments, residuals):
+                yield effect, form
+
+
+def _sizes(machine: Machine, form: Form) -> list[Parameter]:
+    """Return the sizes of a form that have an everyday size which no nuisance stands for."""
+    nuisances = machine.nuisances
+    neutral = {p.name: 0.0 for p in nuisances}
+    return [] if form.is_course else [
+        p for p in form.sizes
+        if p.tolerance > 0.0 and nuisances.absorb(neutral, {p.name: p.step}) == neutral]
+
+
+class _Everyday(Machine):
+    """
+    A machine with everyday sizes.
+
+    sizes : those of the inner machine, m of them
+    responses : derivatives of the readings by them in each experiment, shape (n c, m)
+    """
+
+    def __init__(self, inner: Machine, sizes: tuple[_Size, ...],
+                 responses: Sequence[NDArray[np.floating[Any]]]) -> None:
+        self._numbers = tuple(
+            Parameter(_PREFIX + p.name, p.unit, -p.tolerance, p.tolerance, p.step,
+                      EVERYDAY * p.tolerance) for p in (size.parameter for size in sizes))
+        nuisances = copy(inner.nuisances)
+        nuisances.extend(self._numbers)
+        super().__init__(inner.experiments, nuisances, inner.catalogue)
+        self.inner, self._sizes = inner, sizes
+        # single precision: they are read at every run
+        self._responses: list[NDArray[np.floating[Any]]] = [
+            np.ascontiguousarray(item, np.float32) for item in responses]
+        self._last: dict[int, tuple[bytes, FloatArray]] = {}
+        self.disturbance_inputs, self.notes = inner.disturbance_inputs, inner.notes
+        self.diagram, self.advice, self.words = inner.diagram, inner.advice, inner.words
+        self.planning = inner.planning
+
+    def _parted(self, point: Point) -> tuple[dict[str, float], FloatArray]:
+        """Return a point in the inner machine's names, and the everyday sizes, shape (m,)."""
+        return ({name: value for name, value in point.items() if not everyday_of(name)},
+                np.array([point.get(p.name, 0.0) for p in self._numbers]))
+
+    def _with(self, readings: FloatArray, experiment: int, sizes: FloatArray) -> FloatArray:
+        """Return readings with what the everyday sizes add."""
+        if not sizes.any():
+            return readings
+        # most runs differ in other numbers
+        known, added = self._last.get(experiment, (b'', readings))
+        if known != (same := sizes.tobytes()):
+            added = np.asarray(self._responses[experiment] @ sizes.astype(np.float32),
+                               np.float64).reshape(readings.shape)
+            self._last[experiment] = same, added
+        return np.asarray(readings + added)
+
+    def predict(self, point: Point, experiment: int) -> FloatArray:
+        inner, sizes = self._parted(point)
+        return self._with(self.inner.predict(inner, experiment), experiment, sizes)
+
+    def simulate(self, points: Sequence[Point], only: Sequence[int | None] | None = None,
+                 until: float = math.inf) -> list[list[FloatArray | None]]:
+        parted = [self._parted(point) for point in points]
+        rows = self.inner.simulate([inner for inner, _ in parted], only, until)
+        return [[None if values is None else self._with(values, k, sizes)
+                 for k, values in enumerate(row)]
+                for (_, sizes), row in zip(parted, rows, strict=True)]
+
+    def simulate_disturbed(self, point: Point, place: DisturbanceInput,
+                           course: Course) -> list[FloatArray]:
+        inner, sizes = self._parted(point)
+        return [self._with(values, k, sizes) for k, values in enumerate(
+            self.inner.simulate_disturbed(inner, place, course))]
+
+    @property
+    def time_scales(self) -> TimeScales:
+        return self.inner.time_scales
+
+    def motion(self, experiment: int) -> Motion:
+        return self.inner.motion(experiment)
+
+    def _around(self, inner: Machine) -> Machine:
+        if inner is self.inner:
+            return self
+        # a truncated machine has the first part of each test
+        return _Everyday(inner, self._sizes, [
+            response[:e.measured.size] for e, response in zip(
+                inner.experiments, self._responses, strict=True)])
+
+    def truncated(self) -> Machine:
+        return self._around(self.inner.truncated())
+
+    def low_fidelity(self) -> Machine:
+        return self._around(self.inner.low_fidelity())
+
+    def with_experiments(self, experiments: Sequence[Experiment]) -> Machine:
+        return self._around(self.inner.with_experiments(experiments))
+
+    def without(self, effects: Collection[str]) -> Machine:
+        return self._around(self.inner.without(effects))
+
+    def with_noise_at(self, point: Point) -> Machine:
+        return self._around(self.inner.with_noise_at(self._parted(point)[0]))
+
+    def linearised_at(self, point: Point) -> Machine:
+        return _Everyday(self.inner, self._sizes, _responses(
+            self.inner, self._sizes, self._parted(point)[0]))
