@@ -191,7 +191,7 @@ class _Evidence:
     def weighed(self, responses: Sequence[FloatArray], places: Sequence[slice],
                 smooth: Sequence[float] = (0.0,)) -> tuple[float, float, FloatArray]:
         """Return the evidence for an input, the explained share of the energy, and its factors."""
-        # responses in some rows of each test; `smooth` has times within which it changes, in pulses
+        # `places` are the rows of the responses; `smooth` has times of change, in pulses
         squares, slopes, crosses = [], [], []
         for columns, rows in zip(responses, places, strict=True):
             weighted = columns * self._weight[rows, np.newaxis]
