@@ -15,7 +15,7 @@ from antenna_drive.diagnosis.excitation import (
 )
 from antenna_drive.diagnosis.field_recording import FieldRecording, Note
 from antenna_drive.diagnosis.inference import completed
-from antenna_drive.diagnosis.late_readings import dense, Outputs, parts_of, read_at
+from antenna_drive.diagnosis.late_readings import dense, lagging, Outputs, parts_of, read_at
 from antenna_drive.diagnosis.modifiers import SensorReadings
 from antenna_drive.diagnosis.recorded_command import RecordedCommand
 from antenna_drive.diagnosis.sensors import jitter_of, SensorModel, slips
@@ -117,11 +117,13 @@ class FieldTest:
         digits : readings of the encoder in digits, shape (n,); None if they tell none
         """
         wanted = self.time + errors.clock_rate * (self.time - self.time[0])
-        values = read_at(self.output_times, out.values, wanted, errors.late)
+        filtered = lagging(self.output_times, out.values, errors.lag)
+        values = read_at(self.output_times, filtered, wanted, errors.late)
         for name, tachometer in out.rippling.items():
             c = AT[name]
+            # a ripple may be faster than the outputs: the filter is a delay to it
             values[:, c] = tachometer.read_at(self.output_times, out.values[:, c], wanted,
-                                              float(errors.late[c]))
+                                              float(errors.late[c] + errors.lag[c]))
         values *= errors.gain
         angle = values[:, AT['encoder']]
         for shape, parts in errors.waves.items():

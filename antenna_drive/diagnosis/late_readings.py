@@ -55,6 +55,22 @@ def read_at(time: FloatArray, out: FloatArray, wanted: FloatArray, late: FloatAr
     return found
 
 
+def lagging(time: FloatArray, out: FloatArray, lag: FloatArray) -> FloatArray:
+    """
+    Return outputs behind a first-order low-pass each, in the form of `out`.
+
+    Before the first output nothing has moved; between outputs straight lines are filtered exactly.
+
+    time, out : as in `read_at`
+    lag : time constant of each channel, shape (c,) [s]; 0 for no filter
+    """
+    if not lag.any():
+        return out
+    found = out.copy()
+    _lagging(time, out, lag, found)
+    return found
+
+
 @dataclass(frozen=True)
 class RipplingTachometer:
     """
@@ -113,6 +129,20 @@ def _motion(angle: FloatArray, out: FloatArray, p: Any, motion: FloatArray) -> N
 def _readings(motion: FloatArray, p: Any, found: FloatArray) -> None:
     for i in range(found.size):
         found[i] = tachometer(motion[i, 1], motion[i, 0], p[0])
+
+
+@compiled
+def _lagging(time: FloatArray, out: FloatArray, lag: FloatArray, found: FloatArray) -> None:
+    for c in range(lag.size):
+        if lag[c] <= 0.0:
+            continue
+        found[0, c, 1] = 0.0
+        for i in range(1, time.size):
+            h = time[i] - time[i - 1]
+            behind = lag[c] * (out[i, c, 0] - out[i - 1, c, 0]) / h
+            found[i, c, 0] = out[i, c, 0] - behind + math.exp(-h / lag[c]) * (
+                found[i - 1, c, 0] - out[i - 1, c, 0] + behind)
+            found[i, c, 1] = (out[i, c, 0] - found[i, c, 0]) / lag[c]
 
 
 @compiled

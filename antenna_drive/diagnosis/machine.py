@@ -240,9 +240,9 @@ class AntennaMachine(Machine):
 
     def _job(self, k: int, point: Point, until: float) -> _Job:
         """Return the run of one test at a point: what acts on readings alone is not part of it."""
-        return _Job(k, tuple(item for item in sorted(point.items())
-                             if item[0] in self._run_modifiers
-                             and self._run_modifiers[item[0]][1] in (None, k)), until)
+        known = self._run_modifiers
+        return _Job(k, tuple(sorted(item for item in point.items() if item[0] in known
+                                    and known[item[0]][1] in (None, k))), until)
 
     def outputs(self, point: Point, experiment: int,
                 channels: tuple[str, ...]) -> tuple[FloatArray, FloatArray]:

@@ -126,8 +126,8 @@ class SensorReadings:
     """
     What parameters do to the readings of a run.
 
-    gain, zero, delay : of every reading; the last is by how much earlier it is read than its time
-        stamps say [s]; shape (c,)
+    gain, zero, delay, lag : of every reading, shape (c,); the delay is by how much earlier it is
+        read than its time stamps say [s], the lag the time constant of a filter before [s]
     clock : by how much later all readings are taken [s]
     clock_rate : share by which the recorder's clock is slow
     digit : of the encoder [rad]; 0 for none
@@ -138,6 +138,7 @@ class SensorReadings:
     gain: FloatArray = field(default_factory=lambda: np.ones(len(READINGS)))
     zero: FloatArray = field(default_factory=lambda: np.zeros(len(READINGS)))
     delay: FloatArray = field(default_factory=lambda: np.zeros(len(READINGS)))
+    lag: FloatArray = field(default_factory=lambda: np.zeros(len(READINGS)))
     clock: float = 0.0
     clock_rate: float = 0.0
     digit: float = 0.0
@@ -207,7 +208,7 @@ class SupplyGain(RunModifier):
 
 @dataclass(frozen=True)
 class RecorderError(ReadingModifier):
-    """Adds to gain, zero or delay of a reading, or to the recorder's clock or clock_rate."""
+    """Adds to gain, zero, delay or lag of a reading, or to the recorder's clock or clock_rate."""
 
     kind: str
     reading: str = ''

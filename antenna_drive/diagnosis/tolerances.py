@@ -124,6 +124,9 @@ def _of_zeros_and_recorders(tests: Sequence[FieldTest]) -> Iterator[AntennaParam
             seconds = given.channel_delay_samples * period
             yield replace(_within(f'delay:{name}', 's', seconds, RecorderError('delay', name)),
                           low=0.0)
+        if given.channel_lag_s:
+            yield replace(_within(f'lag:{name}', 's', given.channel_lag_s,
+                                  RecorderError('lag', name)), low=0.0)
 
 
 def _starting_places(k: int, test: FieldTest) -> tuple[AntennaParameter, ...]:

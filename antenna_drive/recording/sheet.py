@@ -149,6 +149,8 @@ _TOLERANCES = (
     *(sensor.zero for sensor in SENSORS if sensor.zero),
     not_negative('channel_delay_samples', 1.0, '1',
                  'constant delay of each recorded channel, in samples', 10.0),
+    # a filter of 25 Hz in front of a slow logger
+    not_negative('channel_lag_s', 6.4e-3, 's', 'time constant of a filter in each channel', 1.0),
     not_negative('clock_ppm', 100.0, '1', "rate of the recorder's clock, in millionths", 1e4),
 )
 

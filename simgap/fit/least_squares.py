@@ -43,6 +43,7 @@ class LeastSquares:
         wanted = [k for k in range(len(self.experiments)) if self.valid[self.rows(k)].any()]
         # where one experiment alone counts, the others need not be simulated
         self._alone = wanted[0] if len(wanted) == 1 else None
+        self._linear: dict[str, Jacobian] = {}  # derivatives by what is linear, shape (n,) each
 
     def at_scale(self, scale: float) -> LeastSquares:
         """Return the same problem at another noise scale."""
@@ -61,10 +62,13 @@ class LeastSquares:
 
     def standardised(self, k: int, predicted: FloatArray | None) -> FloatArray:
         """Return an experiment's residuals in standard deviations, shape (n c,); 0 for none."""
-        experiment = self.experiments[k]
         if predicted is None:
             return np.zeros(self.sizes[k])
-        z = (experiment.measured - predicted) / (self.scale * experiment.noise)
+        return self._whitened(k, self.experiments[k].measured - predicted)
+
+    def _whitened(self, k: int, z: FloatArray) -> FloatArray:
+        experiment = self.experiments[k]
+        z = z / (self.scale * experiment.noise)
         for c, colour in enumerate(experiment.colours):
             z[:, c] = whitened(z[:, c], colour)
         z = z.ravel()
@@ -101,7 +105,12 @@ class LeastSquares:
         """
         variants, only, plan = [], [], []
         sizes = [steps.get(item.name, item.step) for item in parameters]
+        jacobian = np.zeros((residual.size, len(parameters)), np.float32)
         for j, item in enumerate(parameters):
+            column = self._linear_column(item)
+            if column is not None:
+                jacobian[:, j] = column
+                continue
             here, step = point.get(item.name, 0.0), sizes[j]
             # a value at a bound may be off it by a rounding error
             room = step * (1.0 - 1e-9)
@@ -115,7 +124,6 @@ class LeastSquares:
                 variants.append({**point, item.name: here + side * step})
                 only.append(item.experiment)
                 plan.append((j, side, len(sides)))
-        jacobian = np.zeros((residual.size, len(parameters)), np.float32)
         machine = self.machine.low_fidelity()
         if machine is not self.machine and variants:
             # both runs of a difference must have the same fidelity
@@ -136,6 +144,20 @@ class LeastSquares:
             if greatest * sizes[j] < self.settings.fit.dead_column:
                 jacobian[:, j] = 0.0
         return jacobian
+
+    def _linear_column(self, item: Parameter) -> Jacobian | None:
+        """Return the derivative by a number in which the machine is linear; None for another."""
+        if item.name not in self._linear:
+            column = np.zeros(sum(self.sizes), np.float32)
+            for k, experiment in enumerate(self.experiments):
+                response = self.machine.linear_response(item.name, k)
+                if response is None:
+                    return None
+                # nothing follows where nothing was measured
+                gone = 0.0 * experiment.measured
+                column[self.rows(k)] = self._whitened(k, gone + item.step * response) / item.step
+            self._linear[item.name] = column
+        return self._linear[item.name]
 
     def start(self, parameters: Sequence[Parameter], point: dict[str, float],
               jacobian: Jacobian | None = None, central: bool = False) -> FitState:

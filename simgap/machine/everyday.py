@@ -36,10 +36,12 @@ def with_everyday(machine: Machine) -> Machine:
     residuals = [e.measured - predicted for e, predicted in zip(
         machine.experiments, neutral, strict=True) if predicted is not None]
     sizes: dict[str, _Size] = {}
-    for effect, form in _forms(machine, residuals):
-        for p in _sizes(machine, form):
-            # of forms that are alike near zero the first one stands for all
-            sizes.setdefault(p.name, _Size(p, form, effect))
+    # what acts in several places acts in each of them
+    for effect in (item for item in machine.catalogue.values() if not item.parts):
+        for form in machine.catalogue.forms(effect, machine.experiments, residuals):
+            for p in _sizes(machine, form):
+                # of forms that are alike near zero the first one stands for all
+                sizes.setdefault(p.name, _Size(p, form, effect))
     if not sizes:
         return machine
     found = tuple(sizes.values())
@@ -111,14 +113,6 @@ def as_configured(machine: Machine) -> Machine:
     return machine.inner if isinstance(machine, _Everyday) else machine
 
 
-def _forms(machine: Machine, residuals: Sequence[FloatArray]) -> Iterator[tuple[Effect, Form]]:
-    for effect in machine.catalogue.values():
-        # what acts in several places acts in each of them
-        if not effect.parts:
-            for form in machine.catalogue.forms(effect, machine.experiments, residuals):
-                yield effect, form
-
-
 def _sizes(machine: Machine, form: Form) -> list[Parameter]:
     """Return the sizes of a form that have an everyday size which no nuisance stands for."""
     nuisances = machine.nuisances
@@ -141,6 +135,7 @@ class _Everyday(Machine):
         self._numbers = tuple(
             Parameter(_PREFIX + p.name, p.unit, -p.tolerance, p.tolerance, p.step,
                       EVERYDAY * p.tolerance) for p in (size.parameter for size in sizes))
+        self._place = {p.name: j for j, p in enumerate(self._numbers)}
         nuisances = copy(inner.nuisances)
         nuisances.extend(self._numbers)
         super().__init__(inner.experiments, nuisances, inner.catalogue)
@@ -155,8 +150,8 @@ class _Everyday(Machine):
 
     def _parted(self, point: Point) -> tuple[dict[str, float], FloatArray]:
         """Return a point in the inner machine's names, and the everyday sizes, shape (m,)."""
-        return ({name: value for name, value in point.items() if not everyday_of(name)},
-                np.array([point.get(p.name, 0.0) for p in self._numbers]))
+        return ({name: value for name, value in point.items() if name not in self._place},
+                np.array([point.get(name, 0.0) for name in self._place]))
 
     def _with(self, readings: FloatArray, experiment: int, sizes: FloatArray) -> FloatArray:
         """Return readings with what the everyday sizes add."""
@@ -181,6 +176,12 @@ class _Everyday(Machine):
         return [[None if values is None else self._with(values, k, sizes)
                  for k, values in enumerate(row)]
                 for (_, sizes), row in zip(parted, rows, strict=True)]
+
+    def linear_response(self, name: str, experiment: int) -> FloatArray | None:
+        if (place := self._place.get(name)) is None:
+            return None
+        return np.asarray(self._responses[experiment][:, place], np.float64).reshape(
+            self.experiments[experiment].measured.shape)
 
     def simulate_disturbed(self, point: Point, place: DisturbanceInput,
                            course: Course) -> list[FloatArray]:

@@ -135,6 +135,10 @@ class Machine(ABC):
         """Return the machine with what it takes as linear, if anything, taken so at `point`."""
         return self
 
+    def linear_response(self, name: str, experiment: int) -> FloatArray | None:
+        """Return the derivative by what it takes as linear, shape (n, c); None for the rest."""
+        return None
+
     def simulate_disturbed(self, point: Point, place: DisturbanceInput,
                            course: Course) -> list[FloatArray]:
         """

@@ -77,12 +77,8 @@ class Evidence:
         """Return what a hypothesis has to pay for effects of these forms."""
         sought = self.settings.sought * sum(form.scanned for form in forms)
         shows = len(forms) * self.settings.shows / self.scale ** 2
-        return shows + sought + max(len(forms) - 1, 0) * self.price_of_form
-
-    @property
-    def price_of_form(self) -> float:
-        """Return what an error of form could be worth."""
-        return self.settings.form_error ** 2 * self.gain / self.temperature
+        error = self.settings.form_error ** 2 * self.gain / self.temperature
+        return shows + sought + max(len(forms) - 1, 0) * error
 
     def ranked(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
         """Return hypotheses, the best first."""

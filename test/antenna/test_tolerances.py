@@ -102,7 +102,7 @@ def test_every_test_has_its_starting_places_and_the_machine_its_tolerances_once(
 
 GIVEN = Tolerances(tach_zero_rad_s=0.01, amplifier_zero_V=2e-4, recorder_gain=0.01,
                    current_zero_A=0.02, bias_zero_V=0.03, channel_delay_samples=1.0,
-                   clock_ppm=100.0)
+                   channel_lag_s=0.003, clock_ppm=100.0)
 
 
 @pytest.fixture(scope='module')
@@ -118,6 +118,7 @@ def test_a_sheet_says_what_else_may_be_off(tolerant: AntennaMachine) -> None:
     assert bounds['offset:motor_1.amplifier.offset'] == (-2e-4, 2e-4)
     assert bounds['gain:bias_voltage'] == (-0.01, 0.01)
     assert bounds['delay:encoder'] == pytest.approx((0.0, 0.005))
+    assert bounds['lag:current_2'] == (0.0, 0.003)
     assert bounds['zero:current_1:made'] == (-0.02, 0.02)
     assert bounds['clock_rate:made'] == pytest.approx((-1e-4, 1e-4))
     # the effect in the same number knows its tolerance
