@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 from antenna_drive.diagnosis import gust
 from antenna_drive.diagnosis.disturbances import DriveDisturbance
@@ -19,10 +19,8 @@ from antenna_drive.parameters.records import place_of
 import numpy as np
 from simgap.machine.contract import Course
 
-# Tables that are kept: a test has one for each bias voltage and each wave, ...
+# Tables that are kept: a test has one for each bias voltage, each wave and each wind.
 _KEPT_PLANS = 24
-# ... and most runs that follow each other have the same wind.
-_KEPT_WINDS = 8
 # By number: late jumps of the command [s], or other means in its holes [rad/s].
 _Numbered: TypeAlias = tuple[tuple[int, float], ...]
 
@@ -33,24 +31,22 @@ class Plans:
     def __init__(self, tests: Sequence[FieldTest]) -> None:
         self._tests = tests
         self._kept = lru_cache(_KEPT_PLANS)(self._made)
-        self._blown = lru_cache(_KEPT_WINDS)(self._in_wind)
 
     def steps(self, k: int, run: RunSetup, longest: Longest) -> batch.Schedule:
         """Return the steps of a run of test k, none of which is longer than allowed."""
-        key = (k, longest, run.delay, tuple(run.late_jumps.items()),
-               tuple(run.hole_means.items()), run.bias)
-        return (self._kept(*key) if run.gust is None
-                else self._blown(tuple(run.gust.tolist()), *key))
-
-    def _in_wind(self, torque: tuple[float, ...], *key: Any) -> batch.Schedule:
-        return with_torque(self._kept(*key), *gust.course(np.array(torque)))
+        torque = () if run.gust is None else tuple(run.gust.tolist())
+        return self._kept(k, longest, run.delay, tuple(run.late_jumps.items()),
+                          tuple(run.hole_means.items()), run.bias, torque)
 
     def _made(self, k: int, longest: Longest, delay: float, late_jumps: _Numbered,
-              hole_means: _Numbered, bias: Bias) -> batch.Schedule:
+              hole_means: _Numbered, bias: Bias, torque: tuple[float, ...]) -> batch.Schedule:
         test = self._tests[k]
+        if torque:
+            calm = self._kept(k, longest, delay, late_jumps, hole_means, bias, ())
+            return with_torque(calm, *gust.course(np.array(torque)))
         if bias != test.bias:
             return with_bias(
-                self._kept(k, longest, delay, late_jumps, hole_means, test.bias), bias)
+                self._kept(k, longest, delay, late_jumps, hole_means, test.bias, ()), bias)
         command = test.command
         if isinstance(command, RecordedCommand):
             for number, later in late_jumps:

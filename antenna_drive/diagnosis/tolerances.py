@@ -120,13 +120,11 @@ def _of_zeros_and_recorders(tests: Sequence[FieldTest]) -> Iterator[AntennaParam
         if given.recorder_gain and not reading.sensor.is_counter:
             yield _within(f'gain:{name}', '1', given.recorder_gain,
                           RecorderError('gain', name, (reading.gain,) if reading.gain else ()))
-        if given.channel_delay_samples:
-            seconds = given.channel_delay_samples * period
-            yield replace(_within(f'delay:{name}', 's', seconds, RecorderError('delay', name)),
-                          low=0.0)
-        if given.channel_lag_s:
-            yield replace(_within(f'lag:{name}', 's', given.channel_lag_s,
-                                  RecorderError('lag', name)), low=0.0)
+        for kind, seconds in (('delay', given.channel_delay_samples * period),
+                              ('lag', given.channel_lag_s)):
+            if seconds:
+                yield replace(_within(f'{kind}:{name}', 's', seconds, RecorderError(kind, name)),
+                              low=0.0)
 
 
 def _starting_places(k: int, test: FieldTest) -> tuple[AntennaParameter, ...]:

@@ -148,14 +148,13 @@ class LeastSquares:
     def _linear_column(self, item: Parameter) -> Jacobian | None:
         """Return the derivative by a number in which the machine is linear; None for another."""
         if item.name not in self._linear:
-            column = np.zeros(sum(self.sizes), np.float32)
+            column = np.zeros(self.valid.size, np.float32)
             for k, experiment in enumerate(self.experiments):
-                response = self.machine.linear_response(item.name, k)
-                if response is None:
+                if (response := self.machine.linear_response(item.name, k)) is None:
                     return None
                 # nothing follows where nothing was measured
-                gone = 0.0 * experiment.measured
-                column[self.rows(k)] = self._whitened(k, gone + item.step * response) / item.step
+                change = item.step * response + 0.0 * experiment.measured
+                column[self.rows(k)] = self._whitened(k, change) / item.step
             self._linear[item.name] = column
         return self._linear[item.name]
 

@@ -217,6 +217,9 @@ class ByLabel(Machine):
     def linearised_at(self, point: Point) -> Machine:
         return self._around(self.inner.linearised_at(self.labels.mean(point)))
 
+    def linear_response(self, name: str, experiment: int) -> FloatArray | None:
+        return self.inner.linear_response(name, experiment)
+
 
 def can_be_split(form: Form) -> bool:
     """Return whether a form may have a size under each value of a label."""

@@ -75,10 +75,10 @@ def _responses(machine: Machine, sizes: Sequence[_Size],
         p, at = size.parameter, base.get(size.parameter.name, 0.0)
         steps.append(p.step if at + p.step <= p.high else -p.step)
         stepped.append({**size.form.start, **base, p.name: at + steps[-1]})
-    rows = machine.low_fidelity().simulate([*unlike.values(), *stepped])
+    rows: Any = machine.low_fidelity().simulate([*unlike.values(), *stepped])
     before = dict(zip(unlike, rows, strict=False))
     return [np.stack([
-        np.nan_to_num((row[k] - before[frozenset(base)][k]) / step).ravel()  # type: ignore
+        np.nan_to_num((row[k] - before[frozenset(base)][k]) / step).ravel()
         for step, base, row in zip(steps, bases, rows[len(unlike):], strict=True)], axis=-1)
         for k in range(len(machine.experiments))]
 
@@ -132,12 +132,11 @@ class _Everyday(Machine):
 
     def __init__(self, inner: Machine, sizes: tuple[_Size, ...],
                  responses: Sequence[NDArray[np.floating[Any]]]) -> None:
-        self._numbers = tuple(
-            Parameter(_PREFIX + p.name, p.unit, -p.tolerance, p.tolerance, p.step,
-                      EVERYDAY * p.tolerance) for p in (size.parameter for size in sizes))
-        self._place = {p.name: j for j, p in enumerate(self._numbers)}
+        numbers = [Parameter(_PREFIX + p.name, p.unit, -p.tolerance, p.tolerance, p.step,
+                             EVERYDAY * p.tolerance) for p in (size.parameter for size in sizes)]
+        self._place = {p.name: j for j, p in enumerate(numbers)}
         nuisances = copy(inner.nuisances)
-        nuisances.extend(self._numbers)
+        nuisances.extend(numbers)
         super().__init__(inner.experiments, nuisances, inner.catalogue)
         self.inner, self._sizes = inner, sizes
         # single precision: they are read at every run

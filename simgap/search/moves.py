@@ -97,8 +97,8 @@ def refitted(problem: LeastSquares, base: Hypothesis, anchor: Hypothesis,
              for p, names in everyday.alike(problem.machine.catalogue, effect, form)
              for name in (p.name, *names) if name in at}
     # one of them may be in a local minimum
-    points = [{**{p.name: h.state.point().get(p.name, 0.0) for p in problem.machine.nuisances},
-               **sizes} for h in (base, anchor)]
+    points = [{**{p.name: values.get(p.name, 0.0) for p in problem.machine.nuisances}, **sizes}
+              for values in (at, anchor.state.point())]
     point = min(points, key=lambda point: problem.loss(problem.residuals(point)))
     columns = np.column_stack([nuisances, _columns(problem, base.forms, point)])
     state = problem.start((*problem.machine.nuisances, *own), point, columns)

@@ -108,12 +108,11 @@ class Search:
     def _additions(self, base: Hypothesis, count: int, scanning: bool) -> Iterator[Move]:
         """Yield moves that add what is promised most; what could not lead is not fitted."""
         problem, evidence, options = self._problem, self._evidence(), self._options
-        own, top = evidence(base), evidence(self._ranked()[0])
-        paid = evidence.price(base.forms)
+        top, unpaid = evidence(self._ranked()[0]), evidence(base) + evidence.price(base.forms)
         for gain, item in screened(
                 problem, base.state, self._sensitivities, base.effects)[:count]:
-            pays = evidence.price((*base.forms, item.form)) - paid
-            if own + options.hope * gain / evidence.temperature - pays > top:
+            price = evidence.price((*base.forms, item.form))
+            if unpaid + options.hope * gain / evidence.temperature - price > top:
                 yield partial(moves.added, problem, base, item)
         if scanning and not base.has_course and self._leaves_much(base):
             for item, sizes in scan(problem, base.state, self._sensitivities, base.effects):

@@ -115,11 +115,13 @@ def _doubts(verdict: Verdict) -> Iterator[str]:
              for form in verdict.machine.catalogue[effect].forms
              if not (form.is_course or form.is_wave) for p in form.sizes}
     for name, item in top.parameters.items():
+        if name not in sizes:
+            continue
+        word = name.rpartition('.')[2].replace('_', ' ')
         half = 0.5 * (item['ci95'][1] - item['ci95'][0])
-        if name in sizes and item['value'] in (sizes[name].low, sizes[name].high):
-            yield (f'{name.rpartition(".")[2].replace("_", " ").capitalize()} is at the end of '
-                   'its range: widen it, or doubt the model.')
-        if name not in sizes or half <= DEFAULT.verdict.wide * abs(item['value']):
+        if item['value'] in (sizes[name].low, sizes[name].high):
+            yield f'{word.capitalize()} is at the end of its range: widen it, or doubt the model.'
+        if half <= DEFAULT.verdict.wide * abs(item['value']):
             continue
         # what makes half of it is why
         turns = [fold['values'][name] for fold in folds if name in fold['values']]
@@ -131,7 +133,7 @@ def _doubts(verdict: Verdict) -> Iterator[str]:
                    f'{size(sizes[name].tolerance, item["unit"])} of it')
         else:
             why = 'these recordings hardly show it'
-        yield f'The interval of {name.rpartition(".")[2].replace("_", " ")} is wide: {why}.'
+        yield f'The interval of {word} is wide: {why}.'
 
 
 def _nothing(verdict: Verdict) -> tuple[str, list[str]]:

@@ -34,8 +34,7 @@ class Place:
     name: str  # for people
     component: str  # the part of the machine
     evidence: float  # natural logarithm of how much likelier an input makes the gap
-    # share of the gap's energy that an input explains, 0 to 1, net of what its freedom costs
-    explained: float
+    explained: float  # share of the gap's energy that it explains, net of what its freedom costs
 
 
 def places(problem: LeastSquares, point: Mapping[str, float]) -> list[Place]:
@@ -140,8 +139,7 @@ def _pulses_of_reading(experiment: Experiment, channel: int, scales: TimeScales)
     starts = np.arange(first, last - 2.0 * rise, rise)
     pulses = np.maximum(0.0, 1.0 - np.abs(experiment.time[:, np.newaxis] - starts - rise) / rise)
     if experiment.colours:
-        colour = experiment.colours[channel]
-        pulses = np.array([whitened(pulse, colour) for pulse in pulses.T]).T
+        pulses = np.array([whitened(pulse, experiment.colours[channel]) for pulse in pulses.T]).T
     return pulses
 
 
@@ -188,12 +186,12 @@ class _Evidence:
                              - self._slope @ self._inverse @ self._slope)
         self._count = float(np.count_nonzero(weight))
 
-    def weighed(self, responses: Sequence[FloatArray], places: Sequence[slice],
+    def weighed(self, responses: Sequence[FloatArray], slices: Sequence[slice],
                 smooth: Sequence[float] = (0.0,)) -> tuple[float, float, FloatArray]:
         """Return the evidence for an input, the explained share of the energy, and its factors."""
-        # `places` are the rows of the responses; `smooth` has times of change, in pulses
+        # `slices` are the rows of the responses; `smooth` has times of change, in pulses
         squares, slopes, crosses = [], [], []
-        for columns, rows in zip(responses, places, strict=True):
+        for columns, rows in zip(responses, slices, strict=True):
             weighted = columns * self._weight[rows, np.newaxis]
             squares.append(columns.T @ weighted)
             slopes.append(weighted.T @ self.residual[rows])
