@@ -58,7 +58,8 @@ def everyday_wind(k: int, test: str, first_s: float, last_s: float,
     """Yield the knots of the wind of every day in test k while it is seen, of this rms [N m]."""
     for i in range(_CALM * int(first_s / (_CALM * KNOT_S)), knots(last_s), _CALM):
         yield AntennaParameter(f'wind:{test}:{i}', 'N m', -WIDEST * torque, WIDEST * torque,
-                               torque, torque, experiment=k, modifier=_Knot(i, _CALM))
+                               torque, torque, experiment=k, modifier=_Knot(i, _CALM),
+                               is_linear=True)
 
 
 def course(torque: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -7,7 +7,7 @@ No size is exactly zero. Up to the tolerance of its catalogue an effect is no fa
 and what shows and has no name would be taken for another effect. So each has a nuisance of its own
 within the tolerance, whose prior is its everyday size. What so little does is linear in the size:
 its derivative is taken once, at the model as configured and again at the best answer, and such a
-nuisance costs no run.
+nuisance costs no run. So it is with nuisances that the machine declares as linear.
 """
 
 from collections.abc import Collection, Iterator, Sequence
@@ -31,33 +31,38 @@ _PREFIX = 'everyday:'
 
 
 def with_everyday(machine: Machine) -> Machine:
-    """Return a machine with everyday sizes; itself if no effect has one that is not a nuisance."""
+    """Return a machine with everyday sizes; itself if it has none, and nothing that is linear."""
     neutral = machine.simulate([{}])[0]
     residuals = [e.measured - predicted for e, predicted in zip(
         machine.experiments, neutral, strict=True) if predicted is not None]
-    sizes: dict[str, _Size] = {}
+    linear = {p.name: _Linear(p, p.name) for p in machine.nuisances if p.is_linear}
     # what acts in several places acts in each of them
     for effect in (item for item in machine.catalogue.values() if not item.parts):
         for form in machine.catalogue.forms(effect, machine.experiments, residuals):
             for p in _sizes(machine, form):
                 # of forms that are alike near zero the first one stands for all
-                sizes.setdefault(p.name, _Size(p, form, effect))
-    if not sizes:
+                linear.setdefault(p.name, _Linear(Parameter(
+                    _PREFIX + p.name, p.unit, -p.tolerance, p.tolerance, p.step,
+                    EVERYDAY * p.tolerance), p.name, form, effect))
+    if not linear:
         return machine
-    found = tuple(sizes.values())
+    found = tuple(linear.values())
     return _Everyday(machine, found, _responses(machine, found, {}))
 
 
 @dataclass(frozen=True)
-class _Size:
-    """A size of an effect that everyday machines have."""
+class _Linear:
+    """A nuisance in which the machine counts as linear."""
 
     parameter: Parameter
-    form: Form
-    effect: Effect
+    name: str  # in the machine
+    form: Form | None = None  # of the effect of which it is an everyday size
+    effect: Effect | None = None
 
     def besides(self, point: Point, catalogue: Catalogue) -> Point:
         """Return a point without the effect's other forms, which exclude this one."""
+        if self.form is None or self.effect is None:
+            return point
         own = self.form.start
         others = tuple(f'{effect.id}.' for effect in catalogue.values()
                        if self.effect.id in (effect.id, *effect.parts))
@@ -65,22 +70,25 @@ class _Size:
                 if name in own or not name.startswith(others)}
 
 
-def _responses(machine: Machine, sizes: Sequence[_Size],
+def _responses(machine: Machine, linear: Sequence[_Linear],
                point: Point) -> list[NDArray[np.floating[Any]]]:
-    """Return the derivatives by sizes, with the shapes of their forms, at a point."""
-    bases = [size.besides(point, machine.catalogue) for size in sizes]
+    """Return the derivatives by what acts in each experiment, shape (n c, m), at a point."""
+    bases = [item.besides(point, machine.catalogue) for item in linear]
     unlike = {frozenset(base): base for base in bases}
     steps, stepped = [], []
-    for size, base in zip(sizes, bases, strict=True):
-        p, at = size.parameter, base.get(size.parameter.name, 0.0)
+    for item, base in zip(linear, bases, strict=True):
+        p, at = item.parameter, base.get(item.name, 0.0)
         steps.append(p.step if at + p.step <= p.high else -p.step)
-        stepped.append({**size.form.start, **base, p.name: at + steps[-1]})
-    rows: Any = machine.low_fidelity().simulate([*unlike.values(), *stepped])
+        stepped.append({**(item.form.start if item.form else {}), **base,
+                        item.name: at + steps[-1]})
+    rows: Any = machine.low_fidelity().simulate(
+        [*unlike.values(), *stepped],
+        [*[None] * len(unlike), *(item.parameter.experiment for item in linear)])
     before = dict(zip(unlike, rows, strict=False))
     return [np.stack([
         np.nan_to_num((row[k] - before[frozenset(base)][k]) / step).ravel()
-        for step, base, row in zip(steps, bases, rows[len(unlike):], strict=True)], axis=-1)
-        for k in range(len(machine.experiments))]
+        for step, base, row in zip(steps, bases, rows[len(unlike):], strict=True)
+        if row[k] is not None], axis=-1) for k in range(len(machine.experiments))]
 
 
 def everyday_of(name: str) -> str:
@@ -124,21 +132,25 @@ def _sizes(machine: Machine, form: Form) -> list[Parameter]:
 
 class _Everyday(Machine):
     """
-    A machine with everyday sizes.
+    A machine with nuisances in which it counts as linear, everyday sizes among them.
 
-    sizes : those of the inner machine, m of them
-    responses : derivatives of the readings by them in each experiment, shape (n c, m)
+    linear : the nuisances
+    responses : derivatives of the readings by those that act in each experiment, shape (n c, m)
     """
 
-    def __init__(self, inner: Machine, sizes: tuple[_Size, ...],
+    def __init__(self, inner: Machine, linear: tuple[_Linear, ...],
                  responses: Sequence[NDArray[np.floating[Any]]]) -> None:
-        numbers = [Parameter(_PREFIX + p.name, p.unit, -p.tolerance, p.tolerance, p.step,
-                             EVERYDAY * p.tolerance) for p in (size.parameter for size in sizes)]
-        self._place = {p.name: j for j, p in enumerate(numbers)}
+        names = {item.name for item in linear}
         nuisances = copy(inner.nuisances)
-        nuisances.extend(numbers)
+        nuisances[:] = [*(p for p in inner.nuisances if p.name not in names),
+                        *(item.parameter for item in linear)]
         super().__init__(inner.experiments, nuisances, inner.catalogue)
-        self.inner, self._sizes = inner, sizes
+        self.inner, self._linear = inner, linear
+        # by experiment: the column of each nuisance that acts in it
+        self._columns = [{name: j for j, name in enumerate(
+            item.parameter.name for item in linear if item.parameter.experiment in (None, k))}
+            for k in range(len(inner.experiments))]
+        self._own = {item.parameter.name for item in linear}
         # single precision: they are read at every run
         self._responses: list[NDArray[np.floating[Any]]] = [
             np.ascontiguousarray(item, np.float32) for item in responses]
@@ -147,46 +159,45 @@ class _Everyday(Machine):
         self.diagram, self.advice, self.words = inner.diagram, inner.advice, inner.words
         self.planning = inner.planning
 
-    def _parted(self, point: Point) -> tuple[dict[str, float], FloatArray]:
-        """Return a point in the inner machine's names, and the everyday sizes, shape (m,)."""
-        return ({name: value for name, value in point.items() if name not in self._place},
-                np.array([point.get(name, 0.0) for name in self._place]))
+    def _inner_point(self, point: Point) -> dict[str, float]:
+        return {name: value for name, value in point.items() if name not in self._own}
 
-    def _with(self, readings: FloatArray, experiment: int, sizes: FloatArray) -> FloatArray:
-        """Return readings with what the everyday sizes add."""
+    def _with(self, readings: FloatArray, experiment: int, point: Point) -> FloatArray:
+        """Return readings with what the linear nuisances add."""
+        sizes = np.array([point.get(name, 0.0) for name in self._columns[experiment]], np.float32)
         if not sizes.any():
             return readings
         # most runs differ in other numbers
         known, added = self._last.get(experiment, (b'', readings))
         if known != (same := sizes.tobytes()):
-            added = np.asarray(self._responses[experiment] @ sizes.astype(np.float32),
+            added = np.asarray(self._responses[experiment] @ sizes,
                                np.float64).reshape(readings.shape)
             self._last[experiment] = same, added
         return np.asarray(readings + added)
 
     def predict(self, point: Point, experiment: int) -> FloatArray:
-        inner, sizes = self._parted(point)
-        return self._with(self.inner.predict(inner, experiment), experiment, sizes)
+        return self._with(self.inner.predict(self._inner_point(point), experiment), experiment,
+                          point)
 
     def simulate(self, points: Sequence[Point], only: Sequence[int | None] | None = None,
                  until: float = math.inf) -> list[list[FloatArray | None]]:
-        parted = [self._parted(point) for point in points]
-        rows = self.inner.simulate([inner for inner, _ in parted], only, until)
-        return [[None if values is None else self._with(values, k, sizes)
+        rows = self.inner.simulate(list(map(self._inner_point, points)), only, until)
+        return [[None if values is None else self._with(values, k, point)
                  for k, values in enumerate(row)]
-                for (_, sizes), row in zip(parted, rows, strict=True)]
+                for point, row in zip(points, rows, strict=True)]
 
     def linear_response(self, name: str, experiment: int) -> FloatArray | None:
-        if (place := self._place.get(name)) is None:
+        if name not in self._own:
             return None
-        return np.asarray(self._responses[experiment][:, place], np.float64).reshape(
-            self.experiments[experiment].measured.shape)
+        shape = self.experiments[experiment].measured.shape
+        place = self._columns[experiment].get(name)
+        return np.zeros(shape) if place is None else np.asarray(
+            self._responses[experiment][:, place], np.float64).reshape(shape)
 
     def simulate_disturbed(self, point: Point, place: DisturbanceInput,
                            course: Course) -> list[FloatArray]:
-        inner, sizes = self._parted(point)
-        return [self._with(values, k, sizes) for k, values in enumerate(
-            self.inner.simulate_disturbed(inner, place, course))]
+        return [self._with(values, k, point) for k, values in enumerate(
+            self.inner.simulate_disturbed(self._inner_point(point), place, course))]
 
     @property
     def time_scales(self) -> TimeScales:
@@ -199,7 +210,7 @@ class _Everyday(Machine):
         if inner is self.inner:
             return self
         # a truncated machine has the first part of each test
-        return _Everyday(inner, self._sizes, [
+        return _Everyday(inner, self._linear, [
             response[:e.measured.size] for e, response in zip(
                 inner.experiments, self._responses, strict=True)])
 
@@ -216,8 +227,8 @@ class _Everyday(Machine):
         return self._around(self.inner.without(effects))
 
     def with_noise_at(self, point: Point) -> Machine:
-        return self._around(self.inner.with_noise_at(self._parted(point)[0]))
+        return self._around(self.inner.with_noise_at(self._inner_point(point)))
 
     def linearised_at(self, point: Point) -> Machine:
-        return _Everyday(self.inner, self._sizes, _responses(
-            self.inner, self._sizes, self._parted(point)[0]))
+        return _Everyday(self.inner, self._linear, _responses(
+            self.inner, self._linear, self._inner_point(point)))

@@ -4,23 +4,17 @@
 
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
-from functools import cache
 import math
 from typing import Any
 
 import numpy as np
-from scipy.optimize import brentq
-from simgap.fit.box_qp import BoxQuadratic
 from simgap.fit.cholesky import factored, ROUNDING, solved
 from simgap.fit.least_squares import LeastSquares
 from simgap.fit.noise import with_model_error
-from simgap.fit.state import FitState, prior_precision, proper_precision
+from simgap.fit.state import FitState, proper_precision
 from simgap.machine.contract import FloatArray, Machine, Parameter
 from simgap.machine.everyday import everyday_of
 from simgap.settings import DEFAULT
-
-# a size is found to this share of itself
-_SHARE = 0.01
 
 
 @dataclass(frozen=True)
@@ -61,7 +55,6 @@ def visibility(problem: LeastSquares, state: FitState,
     factor = factored(known / np.outer(scale, scale), ROUNDING)
     ids, units, sizes, columns, remainders = [], [], [], [], []
     price = inflated * settings.evidence.shows
-    imitation = _Imitation(state, settings.interval.derivative_error)
     asked = [effect for effect in machine.catalogue.values() if not among or effect.id in among]
     for i, effect in enumerate(asked):
         progress(i / len(asked))
@@ -73,7 +66,9 @@ def visibility(problem: LeastSquares, state: FitState,
         imitated = solved(factor, cross / scale) / scale
         ids.append(effect.id)
         units.append(first.unit)
-        sizes.append(imitation.least_visible(first, float(column @ column), cross, price))
+        power = float(column @ column)
+        sure = power * (1.0 - settings.interval.derivative_error ** 2) - float(cross @ imitated)
+        sizes.append(_least_visible(first, sure, price))
         columns.append(column)
         remainders.append(column - jacobian @ imitated)
     # what nuisances imitate has the price of their priors
@@ -91,59 +86,12 @@ def _without_everyday(state: FitState) -> FitState:
                     state.jacobian[:, kept], state.weight, state.cost)
 
 
-class _Imitation:
-    """What nuisances within their bounds leave of an effect, by derivatives at one point."""
-
-    def __init__(self, state: FitState, derivative_error: float) -> None:
-        self._error = derivative_error
-        self._hessian = state.hessian + np.diag(prior_precision(state.parameters))
-        self._programme = BoxQuadratic(
-            self._hessian, np.array([p.low for p in state.parameters]) - state.x,
-            np.array([p.high for p in state.parameters]) - state.x)
-
-    def least_visible(self, number: Parameter, power: float, cross: FloatArray,
-                      price: float) -> float:
-        """Return the size above which an effect exceeds its tolerance and leaves `price`."""
-        # `number` is the effect's first; `power` and `cross`, shape (m,), are the products of its
-        # column with itself and with those of the nuisances. Either sign has to show.
-        # where nothing imitates it; a little less, so that rounding does not make it visible
-        least = (1.0 - _SHARE) * math.sqrt(2.0 * price / power) if power > 0.0 else math.inf
-        least = max(least, number.tolerance)
-
-        def of_sign(sign: float, bound: float) -> float:
-            step: FloatArray | None = None
-
-            # the root finder asks for both ends again
-            @cache
-            def surplus(size: float) -> float:
-                nonlocal step
-                left, step = self._left(sign * size, power, cross, step)
-                return left - price
-
-            if bound <= least:
-                return math.inf
-            if surplus(least) >= 0.0:
-                return least
-            # What is left over the square of the size grows with it, so there is one such size. It
-            # is approached from below in small steps, each of which helps with the next.
-            low, high = least, least
-            while surplus(high) < 0.0:
-                if high >= bound:
-                    return math.inf
-                low, high = high, min(2.0 * high, bound)
-            return float(brentq(surplus, low, high, xtol=_SHARE * low))
-
-        return max(of_sign(sign, bound)
-                   for sign, bound in ((-1.0, -number.low), (1.0, number.high)) if bound > 0.0)
-
-    def _left(self, size: float, power: float, cross: FloatArray,
-              near: FloatArray | None) -> tuple[float, FloatArray]:
-        """Return what is surely left of a size, in halves of a chi-square, and who imitates it."""
-        gradient = -size * cross
-        step = self._programme.step(gradient, near)
-        whole = 0.5 * size ** 2 * power
-        imitated = float(gradient @ step - 0.5 * step @ self._hessian @ step)
-        return whole * (1.0 - self._error ** 2) - imitated, step
+def _least_visible(number: Parameter, left: float, price: float) -> float:
+    """Return the size that exceeds its tolerance and leaves `price`; `left` is for a size of 1."""
+    least = max(math.sqrt(2.0 * price / left) if left > 0.0 else math.inf, number.tolerance)
+    # either sign has to show
+    return least if all(bound > least for bound in (-number.low, number.high)
+                        if bound > 0.0) else math.inf
 
 
 def could_hide(problem: LeastSquares, state: FitState,

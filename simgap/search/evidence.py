@@ -73,6 +73,11 @@ class Evidence:
         sizes = np.array([not p.prior_sigma and not p.is_shape for p in state.parameters], bool)
         return np.where(sizes & (one > 0.0), one, proper_precision(state.parameters))
 
+    @property
+    def reach(self) -> float:
+        """Return how far behind the best a hypothesis may be and still overtake it."""
+        return self.settings.shows + self.settings.form_error * self.gain / self.temperature
+
     def price(self, forms: Sequence[Form]) -> float:
         """Return what a hypothesis has to pay for effects of these forms."""
         sought = self.settings.sought * sum(form.scanned for form in forms)

@@ -127,7 +127,9 @@ def led(problem: LeastSquares, base: Hypothesis) -> Hypothesis:
                          settings=problem.settings)
     point = state.point()
     for part in (alone, problem):
-        begun = part.start(state.parameters, starts.with_initial_conditions(part, point))
+        # the derivatives where it stood serve until fresh ones are taken
+        begun = part.start(state.parameters, starts.with_initial_conditions(part, point),
+                           state.jacobian * part.valid[:, np.newaxis])
         found = starts.settled(part, part.fit(begun, iterations), 1)
         point = found.point()
     return replace(base, state=found) if found.cost < state.cost else base

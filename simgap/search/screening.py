@@ -148,4 +148,5 @@ def scan(problem: LeastSquares, state: FitState, known: Sequence[Sensitivity],
         return total, item, found
 
     fine = sorted(map(refined, coarse[:2 * count]), key=lambda entry: entry[0])
-    return [(item, found) for _, item, found in fine[:count]]
+    none = problem.loss(state.residual)
+    return [(item, found) for total, item, found in fine[:count] if total < none]

@@ -152,16 +152,15 @@ class Search:
             self._progress(0.3 + 0.3 * number / options.rounds, 'several effects')
             ranked, evidence = self._ranked(), self._evidence()
             top = evidence(ranked[0])
-            leading = [h for h in ranked if h.effects
-                       # where everything that it leaves was explained, it would lead
-                       and evidence(h) + h.cost / evidence.temperature > top
+            leading = [h for h in ranked if h.effects and evidence(h) > top - evidence.reach
                        and (1.0 - options.settled) * expanded.get(
                            frozenset(h.effects), np.inf) > h.cost]
             if not leading or (number and leading[0] is not ranked[0]):
                 break
-            leading = list(self._pool.map(
-                self._led, leading[:1 if number else options.leading]))
-            self._keep(leading)
+            leading = [self._led(leading[0]), *(
+                h.with_jacobian(self._problem)
+                for h in leading[1:1 if number else options.leading])]
+            self._keep(leading[:1])
             if self._lower_noise():
                 continue  # a fit that still gains has not ended: what it lacks is not known yet
             number += 1
@@ -205,7 +204,7 @@ class Search:
                 break
             self._problem = self._at_noise(level)
             state = self._problem.start(
-                nuisances, with_initial_conditions(self._problem, state.point()))
+                nuisances, state.point(), state.jacobian * (scale / self._problem.scale))
         return Hypothesis((), (), state)
 
     def _beginning(self) -> dict[str, float]:
@@ -273,9 +272,10 @@ class Search:
         """Fit the best to the whole tests, at the noise that the best of them shows."""
         self._progress(0.6, 'the best in full')
         options = self._options
-        ranked = self._ranked()
+        ranked, evidence = self._ranked(), self._evidence()
         best, none = ranked[0], self._found[frozenset()]
-        chosen = [h for h in ranked if h.effects][:options.finalists]
+        chosen = [h for h in ranked if h.effects
+                  and evidence(h) > evidence(best) - evidence.reach][:options.finalists]
         # the motion that was found may make readings noisier than the model without effects
         settings = self._whole.settings
         self._problem = LeastSquares(
