@@ -11,6 +11,9 @@ import math
 from antenna_drive.diagnosis.modifiers import ADD, SET
 from simgap.machine.contract import DisturbanceInput
 
+# One unit of a torque on the axis [N m].
+_AXIS = 3e4
+
 
 @dataclass(frozen=True)
 class DriveDisturbance(DisturbanceInput):
@@ -27,8 +30,10 @@ class DriveDisturbance(DisturbanceInput):
     settings: tuple[tuple[str, str, float], ...] = ()
 
 
-def _inputs() -> Iterator[DriveDisturbance]:
-    yield DriveDisturbance('torque on the axis', 'axis', 'plant.axis.steady_wind_torque', 3e4)
+def disturbances(wind: float) -> Iterator[DriveDisturbance]:
+    """Yield the places; the wind of every day has this rms [N m]."""
+    yield DriveDisturbance('torque on the axis', 'axis', 'plant.axis.steady_wind_torque', _AXIS,
+                           everyday=wind / _AXIS)
     yield DriveDisturbance('voltage in the torque share', 'torque_share',
                            'torque_share.circuit.fade_out_voltage', 0.2)
     for m in (1, 2):
@@ -43,6 +48,3 @@ def _inputs() -> Iterator[DriveDisturbance]:
         yield DriveDisturbance(f'displacement in gearbox {m}', f'gearbox_{m}', tooth, 2e-3, (
             (tooth, ADD, 1e-12), (f'{tooth}_cycles', SET, 0.0),
             (f'{tooth}_phase', SET, 0.5 * math.pi)))
-
-
-DISTURBANCES = tuple(_inputs())

@@ -18,14 +18,16 @@ from antenna_drive.diagnosis.advice import ADVICE
 from antenna_drive.diagnosis.antenna_catalogue import AntennaCatalogue
 from antenna_drive.diagnosis.catalogue import catalogue, EXTRA_MODE
 from antenna_drive.diagnosis.diagram import DIAGRAM
-from antenna_drive.diagnosis.disturbances import DISTURBANCES, DriveDisturbance
+from antenna_drive.diagnosis.disturbances import disturbances, DriveDisturbance
 from antenna_drive.diagnosis.excitation import Longest
 from antenna_drive.diagnosis.field_test import FieldTest, prepared
 from antenna_drive.diagnosis.late_readings import Outputs, RipplingTachometer
 from antenna_drive.diagnosis.modifiers import KnownModifiers, RunSetup, SensorReadings
 from antenna_drive.diagnosis.plans import disturbed, Plans
 from antenna_drive.diagnosis.sensors import digit_of
-from antenna_drive.diagnosis.tolerances import AntennaNuisances, nuisances, tolerated
+from antenna_drive.diagnosis.tolerances import (
+    AntennaNuisances, everyday_wind_torque, nuisances, tolerated,
+)
 from antenna_drive.diagnosis.waves import fastest_wave, is_there
 from antenna_drive.diagnosis.words import words
 from antenna_drive.emulator import batch
@@ -87,7 +89,6 @@ class AntennaMachine(Machine):
     """
 
     catalogue: AntennaCatalogue
-    disturbance_inputs: Sequence[DisturbanceInput] = DISTURBANCES
     time_scales = _TIME_SCALES
     diagram = DIAGRAM
     advice = ADVICE
@@ -123,6 +124,7 @@ class AntennaMachine(Machine):
                          AntennaCatalogue((tolerated(effect, tolerances)
                                            for effect in effects.values()),
                                           modifiers, self._digit > 0.0))
+        self.disturbance_inputs = tuple(disturbances(everyday_wind_torque(self._tests[0])))
         self.experiments = self._experiments({})
         self.planning = {'sheet': sheet_tree(_in_common(test.sheet for test in self._tests))}
 

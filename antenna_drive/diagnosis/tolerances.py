@@ -134,6 +134,13 @@ def _starting_places(k: int, test: FieldTest) -> tuple[AntennaParameter, ...]:
         modifier=add(f'{motor}.start_in_gap')) for motor in ('motor_1', 'motor_2'))
 
 
+def everyday_wind_torque(test: FieldTest) -> float:
+    """Return the rms torque of the wind that is there every day [N m]."""
+    axis = test.record['plant']['axis']
+    return _WIND * float(axis['coulomb_torque'][0] * axis['friction_torque_per_ampere'][0]
+                         * axis['gear_ratio'][0])
+
+
 def _of_a_test(k: int, test: FieldTest, tolerance: float) -> Iterator[AntennaParameter]:
     yield from _starting_places(k, test)
     if test.record['torque_share']['circuit']['bias_source'][0] == 1:
@@ -145,11 +152,8 @@ def _of_a_test(k: int, test: FieldTest, tolerance: float) -> Iterator[AntennaPar
         yield AntennaParameter(f'day:{path}:{test.name}', '1', -WIDEST * _WARMTH,
                                WIDEST * _WARMTH, 0.01, _WARMTH, experiment=k,
                                modifier=scale(path))
-    axis = test.record['plant']['axis']
-    friction = float(axis['coulomb_torque'][0] * axis['friction_torque_per_ampere'][0]
-                     * axis['gear_ratio'][0])
     yield from everyday_wind(k, test.name, float(test.time[0]), float(test.time[-1]),
-                             _WIND * friction)
+                             everyday_wind_torque(test))
 
     if isinstance(test.command, RecordedCommand):
         command = test.command

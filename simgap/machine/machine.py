@@ -12,7 +12,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 import math
 from types import MappingProxyType
 from typing import Any
@@ -36,6 +36,7 @@ class DisturbanceInput:
 
     name: str  # unique in its machine, for people
     component: str  # the part of the machine that it acts on
+    everyday: float = field(default=0.0, kw_only=True)  # rms of what acts there every day
 
 
 class Machine(ABC):

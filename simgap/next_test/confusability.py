@@ -8,13 +8,18 @@ import math
 from typing import Any
 
 import numpy as np
+from scipy.optimize import brentq
+from simgap.fit.box_qp import box_constrained_step
 from simgap.fit.cholesky import factored, ROUNDING, solved
 from simgap.fit.least_squares import LeastSquares
 from simgap.fit.noise import with_model_error
-from simgap.fit.state import FitState, proper_precision
+from simgap.fit.state import FitState, prior_precision, proper_precision
 from simgap.machine.contract import FloatArray, Machine, Parameter
 from simgap.machine.everyday import everyday_of
 from simgap.settings import DEFAULT
+
+# A size is found to this share of itself.
+_SHARE = 0.01
 
 
 @dataclass(frozen=True)
@@ -55,6 +60,10 @@ def visibility(problem: LeastSquares, state: FitState,
     factor = factored(known / np.outer(scale, scale), ROUNDING)
     ids, units, sizes, columns, remainders = [], [], [], [], []
     price = inflated * settings.evidence.shows
+    hessian = state.hessian + np.diag(prior_precision(state.parameters))
+    low, high = (np.array([getattr(p, side) for p in state.parameters]) - state.x
+                 for side in ('low', 'high'))
+    sure = 1.0 - settings.interval.derivative_error ** 2
     asked = [effect for effect in machine.catalogue.values() if not among or effect.id in among]
     for i, effect in enumerate(asked):
         progress(i / len(asked))
@@ -67,8 +76,14 @@ def visibility(problem: LeastSquares, state: FitState,
         ids.append(effect.id)
         units.append(first.unit)
         power = float(column @ column)
-        sure = power * (1.0 - settings.interval.derivative_error ** 2) - float(cross @ imitated)
-        sizes.append(_least_visible(first, sure, price))
+
+        def left(size: float, cross: FloatArray = cross, power: float = power) -> float:
+            gradient = -size * cross
+            step = box_constrained_step(hessian, gradient, low, high)
+            return (0.5 * size ** 2 * power * sure
+                    - float(gradient @ step - 0.5 * step @ hessian @ step))
+
+        sizes.append(_least_visible(first, power, left, price))
         columns.append(column)
         remainders.append(column - jacobian @ imitated)
     # what nuisances imitate has the price of their priors
@@ -86,12 +101,30 @@ def _without_everyday(state: FitState) -> FitState:
                     state.jacobian[:, kept], state.weight, state.cost)
 
 
-def _least_visible(number: Parameter, left: float, price: float) -> float:
-    """Return the size that exceeds its tolerance and leaves `price`; `left` is for a size of 1."""
-    least = max(math.sqrt(2.0 * price / left) if left > 0.0 else math.inf, number.tolerance)
-    # either sign has to show
-    return least if all(bound > least for bound in (-number.low, number.high)
-                        if bound > 0.0) else math.inf
+def _least_visible(number: Parameter, power: float, left: Callable[[float], float],
+                   price: float) -> float:
+    """Return the size above which an effect exceeds its tolerance and leaves `price`."""
+    # `number` is the effect's first, `power` the square of its column, and `left` what is surely
+    # left of a size, in halves of a chi-square. Either sign has to show.
+    # where nothing imitates it; a little less, so that rounding does not make it visible
+    least = (1.0 - _SHARE) * math.sqrt(2.0 * price / power) if power > 0.0 else math.inf
+    least = max(least, number.tolerance)
+
+    def of_sign(sign: float, bound: float) -> float:
+        def surplus(size: float) -> float:
+            return math.log(max(left(sign * math.exp(size)), 1e-9) / price)
+
+        if bound <= least:
+            return math.inf
+        first, last = math.log(least), math.log(bound)
+        if surplus(first) >= 0.0:
+            return least
+        # what is left over the square of the size grows with it, so there is one such size
+        return (math.exp(brentq(surplus, first, last, xtol=_SHARE)) if surplus(last) > 0.0
+                else math.inf)
+
+    return max(of_sign(sign, bound)
+               for sign, bound in ((-1.0, -number.low), (1.0, number.high)) if bound > 0.0)
 
 
 def could_hide(problem: LeastSquares, state: FitState,

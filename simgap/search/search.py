@@ -281,7 +281,8 @@ class Search:
         self._problem = LeastSquares(
             self._whole.machine.with_noise_at(best.state.point()), settings=settings)
         self._refit(best, [best])
-        best = self._found[frozenset(best.effects)]
+        best = moves.settled(
+            self._problem, self._found[frozenset(best.effects)], options.passes)
         point = best.state.point()
         self._problem = LeastSquares(with_noise_left(
             self._problem.machine.linearised_at(point), point, settings.noise,

@@ -41,10 +41,16 @@ def places(problem: LeastSquares, point: Mapping[str, float]) -> list[Place]:
     """Return where an unknown input may act, the likeliest first; `point` is of the nuisances."""
     evidence = _Evidence.at(problem, point)
     scales, channels = problem.machine.time_scales, problem.experiments[0].channels
-    # name, part, evidence and share of the energy
-    found = [(place.name, place.component, *evidence.weighed(_columns(
-        problem, point, place, evidence.residual)[0], _rows_of(problem), _SMOOTH)[:2])
-        for place in problem.machine.disturbance_inputs]
+    inputs = {place: _columns(problem, point, place, evidence.residual)[0]
+              for place in problem.machine.disturbance_inputs}
+    found = []  # name, part, evidence and share of the energy
+    for place, responses in inputs.items():
+        weighed, share, heights = evidence.weighed(responses, _rows_of(problem), _SMOOTH)
+        if place.everyday and np.sqrt(np.mean(heights ** 2)) < place.everyday:
+            # nor is it something unknown that this is taken for
+            evidence = evidence.beside(responses, place.everyday)
+        else:
+            found.append((place.name, place.component, weighed, share))
     found += [(f'reading of {channel}', channel, *evidence.weighed(
         [_pulses_of_reading(experiment, c, scales) for experiment in problem.experiments],
         _rows_of(problem, c))[:2]) for c, channel in enumerate(channels)]
@@ -176,15 +182,23 @@ class _Evidence:
     def __init__(self, residual: FloatArray, loud: float, weight: FloatArray,
                  nuisances: FloatArray, prior: FloatArray) -> None:
         self.residual, self._weight = residual, weight
-        self._loud = loud
+        self._nuisances, self._prior = nuisances, prior
         weighted = nuisances * weight[:, np.newaxis]
         square = nuisances.T @ weighted + np.diag(prior)
         self._inverse = np.linalg.pinv(square, hermitian=True)
         self._slope = weighted.T @ residual
         self._weighted = weighted
-        self._energy = float(residual @ (weight * residual)
-                             - self._slope @ self._inverse @ self._slope)
+        whole = float(residual @ (weight * residual))
+        self._energy = whole - float(self._slope @ self._inverse @ self._slope)
+        self._loud = loud * self._energy / whole
         self._count = float(np.count_nonzero(weight))
+
+    def beside(self, responses: Sequence[FloatArray], size: float) -> _Evidence:
+        """Return that beside an input of this standard deviation."""
+        columns = linalg.block_diag(*responses)
+        return _Evidence(self.residual, self._loud, self._weight,
+                         np.hstack([self._nuisances, columns]),
+                         np.append(self._prior, np.full(columns.shape[1], size ** -2.0)))
 
     def weighed(self, responses: Sequence[FloatArray], slices: Sequence[slice],
                 smooth: Sequence[float] = (0.0,)) -> tuple[float, float, FloatArray]:
@@ -229,12 +243,13 @@ class _Evidence:
     def repeated(self, channel: int, problem: LeastSquares) -> tuple[float, float]:
         """Return the evidence that a reading repeats itself within a pulse, and its share."""
         products, count = np.zeros(_LAGS + 1), 0
+        left_over = self.residual - self._nuisances @ (self._inverse @ self._slope)
         for k, experiment in enumerate(problem.experiments):
             rows = problem.rows(k)
             if experiment.channels[channel] in experiment.quantised:
                 continue
             shape = experiment.measured.shape
-            z = (self.residual[rows] * np.sqrt(self._weight[rows])).reshape(shape)[:, channel]
+            z = (left_over[rows] * np.sqrt(self._weight[rows])).reshape(shape)[:, channel]
             products += [float(z[lag:] @ z[:z.size - lag]) for lag in range(_LAGS + 1)]
             count += int(np.count_nonzero(z))
         if count < 10 * _LAGS:
