@@ -247,12 +247,14 @@ def _quantisation(digit: float) -> Form | AntennaParameter:
     return Form(DIGITS_SEEN, (_number('step', 'rad', 0.0, digit, digit, digits), turn))
 
 
-def catalogue(durations_s: Sequence[float] = (), encoder_digit: float = 0.0) -> dict[str, Effect]:
+def catalogue(durations_s: Sequence[float] = (), encoder_digit: float = 0.0,
+              wind: float = 0.0) -> dict[str, Effect]:
     """
     Return the catalogue of the drive, by id.
 
     durations_s : of the tests, in each of which a gust has a course of its own [s]
     encoder_digit : digit that the encoder's readings tell [rad]; 0 if they tell none
+    wind : rms torque of the wind of every day [N m]
     """
     into = _Catalogue()
     for component, motors in MOTORS.items():
@@ -263,7 +265,7 @@ def catalogue(durations_s: Sequence[float] = (), encoder_digit: float = 0.0) -> 
     _share_effects(into)
     _axis_effects(into)
     _sensor_effects(into, encoder_digit)
-    into.add('axis', 'wind_gust', gust.gust_form(durations_s))
+    into.add('axis', 'wind_gust', gust.gust_form(durations_s, wind))
     into.add('loop', 'delay', Form('of the command', (_number(
         'time', 's', 0.0, 0.2, 5e-4, add('test_signal.delay'), healthy=5e-4),
     )), Form('of the rate error', (_number(

@@ -44,11 +44,11 @@ def knots(duration_s: float) -> int:
     return int(duration_s / KNOT_S) + 2
 
 
-def gust_form(durations_s: Sequence[float]) -> Form:
-    """Return the form of a gust in tests of these durations [s]."""
+def gust_form(durations_s: Sequence[float], everyday: float) -> Form:
+    """Return the form of a gust in tests of these durations [s]; `everyday` is an rms [N m]."""
     return Form('torque over time', tuple(
         AntennaParameter(f'{ID}.torque:{k}:{i}', 'N m', -1e6, 1e6, 2e3, 3e4, experiment=k,
-                         modifier=_Knot(i))
+                         tolerance=WIDEST * everyday, modifier=_Knot(i))
         for k, duration in enumerate(durations_s) for i in range(knots(duration))),
         is_course=True)
 

@@ -63,6 +63,8 @@ def visibility(problem: LeastSquares, state: FitState,
     hessian = state.hessian + np.diag(prior_precision(state.parameters))
     low, high = (np.array([getattr(p, side) for p in state.parameters]) - state.x
                  for side in ('low', 'high'))
+    unit = np.sqrt(np.maximum(np.diag(hessian), 1e-30))
+    unbounded = factored(hessian / np.outer(unit, unit), ROUNDING)
     sure = 1.0 - settings.interval.derivative_error ** 2
     asked = [effect for effect in machine.catalogue.values() if not among or effect.id in among]
     for i, effect in enumerate(asked):
@@ -83,7 +85,9 @@ def visibility(problem: LeastSquares, state: FitState,
             return (0.5 * size ** 2 * power * sure
                     - float(gradient @ step - 0.5 * step @ hessian @ step))
 
-        sizes.append(_least_visible(first, power, left, price))
+        followed = solved(unbounded, cross / unit) / unit
+        free = 0.5 * (power * sure - float(cross @ followed))
+        sizes.append(_least_visible(first, power, free, left, price))
         columns.append(column)
         remainders.append(column - jacobian @ imitated)
     # what nuisances imitate has the price of their priors
@@ -101,11 +105,12 @@ def _without_everyday(state: FitState) -> FitState:
                     state.jacobian[:, kept], state.weight, state.cost)
 
 
-def _least_visible(number: Parameter, power: float, left: Callable[[float], float],
+def _least_visible(number: Parameter, power: float, free: float, left: Callable[[float], float],
                    price: float) -> float:
     """Return the size above which an effect exceeds its tolerance and leaves `price`."""
     # `number` is the effect's first, `power` the square of its column, and `left` what is surely
-    # left of a size, in halves of a chi-square. Either sign has to show.
+    # left of a size, in halves of a chi-square; of a size of one it is at least `free`, what is
+    # left without bounds. Either sign has to show.
     # where nothing imitates it; a little less, so that rounding does not make it visible
     least = (1.0 - _SHARE) * math.sqrt(2.0 * price / power) if power > 0.0 else math.inf
     least = max(least, number.tolerance)
@@ -116,7 +121,8 @@ def _least_visible(number: Parameter, power: float, left: Callable[[float], floa
 
         if bound <= least:
             return math.inf
-        first, last = math.log(least), math.log(bound)
+        most = math.sqrt(1.1 * price / free) if free > 0.0 else math.inf
+        first, last = math.log(least), math.log(max(min(most, bound), least))
         if surplus(first) >= 0.0:
             return least
         # what is left over the square of the size grows with it, so there is one such size

@@ -36,7 +36,8 @@ def sensitivities(problem: LeastSquares, state: FitState,
         state.residual[problem.rows(k)].reshape(e.measured.shape) * e.noise * problem.scale
         for k, e in enumerate(problem.experiments)]
     forms = [(effect.id, form) for effect in machine.catalogue.values()
-             for form in machine.catalogue.forms(effect, problem.experiments, residuals)]
+             for form in machine.catalogue.forms(effect, problem.experiments, residuals)
+             if not form.is_course]
     return list(concurrently(
         lambda item: Sensitivity(item[0], item[1], jacobian_of_form(problem, state, item[1])),
         forms))

@@ -46,8 +46,9 @@ def places(problem: LeastSquares, point: Mapping[str, float]) -> list[Place]:
     found = []  # name, part, evidence and share of the energy
     for place, responses in inputs.items():
         weighed, share, heights = evidence.weighed(responses, _rows_of(problem), _SMOOTH)
-        if place.everyday and np.sqrt(np.mean(heights ** 2)) < place.everyday:
-            # nor is it something unknown that this is taken for
+        if (evidence.net(weighed) > problem.settings.verdict.left
+                and np.sqrt(np.mean(heights ** 2)) < place.everyday):
+            # nor is it something unknown elsewhere that this is taken for
             evidence = evidence.beside(responses, place.everyday)
         else:
             found.append((place.name, place.component, weighed, share))
@@ -172,14 +173,13 @@ class _Evidence:
             1.0, bound / np.maximum(np.abs(residual), 1e-12)), 0.0) / level ** 2
         nuisances = problem.machine.nuisances
         jacobian = problem.jacobian(here, nuisances, residual, central=False).astype(float)
-        # what is quieter than the noise that is stated is no gap
         stated = np.concatenate([np.tile([colour.level for colour in e.colours]
                                          or np.ones(len(e.channels)), e.time.size)
                                  for e in problem.experiments])
-        loud = min(1.0, float(np.mean((stated * residual)[problem.valid] ** 2)))
-        return cls(residual, loud, weight, jacobian, prior_precision(nuisances))
+        power = float(np.mean((stated * residual)[problem.valid] ** 2))
+        return cls(residual, power, weight, jacobian, prior_precision(nuisances))
 
-    def __init__(self, residual: FloatArray, loud: float, weight: FloatArray,
+    def __init__(self, residual: FloatArray, power: float, weight: FloatArray,
                  nuisances: FloatArray, prior: FloatArray) -> None:
         self.residual, self._weight = residual, weight
         self._nuisances, self._prior = nuisances, prior
@@ -190,13 +190,14 @@ class _Evidence:
         self._weighted = weighted
         whole = float(residual @ (weight * residual))
         self._energy = whole - float(self._slope @ self._inverse @ self._slope)
-        self._loud = loud * self._energy / whole
+        # `power` is that of the residual in stated noise; what is quieter than that is no gap
+        self._power, self._loud = power, min(1.0, power * self._energy / whole)
         self._count = float(np.count_nonzero(weight))
 
     def beside(self, responses: Sequence[FloatArray], size: float) -> _Evidence:
         """Return that beside an input of this standard deviation."""
         columns = linalg.block_diag(*responses)
-        return _Evidence(self.residual, self._loud, self._weight,
+        return _Evidence(self.residual, self._power, self._weight,
                          np.hstack([self._nuisances, columns]),
                          np.append(self._prior, np.full(columns.shape[1], size ** -2.0)))
 
