@@ -6,8 +6,6 @@ The tests that the drive may run, as the design of the next test asks for them.
 They are waveforms of several families, with their amplitudes and periods.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path

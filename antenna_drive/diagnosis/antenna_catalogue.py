@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The catalogue of the antenna's effects; the orders of its waves are found or named."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 
 from antenna_drive.diagnosis.catalogue import DIGITS_SEEN

@@ -7,8 +7,6 @@ The voltage tells its source: a constant, one step, or the torque-share circuit,
 are then fed with the recorded currents.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence, Set
 from dataclasses import dataclass, fields, replace
 from functools import cache

@@ -10,8 +10,6 @@ A new effect takes one term in `physics` (with a neutral default in `parameters.
 here with its numbers and what they do (see `modifiers`), and its words in `words.yaml`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial

@@ -8,8 +8,6 @@ motion is cut off. It is at the time of a regular sequence of jumps if there is 
 halfway between the samples.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product

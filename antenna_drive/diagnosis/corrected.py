@@ -7,8 +7,6 @@ What a number of the configuration stands for is written there. The recorder's o
 part of the machine: they are returned beside it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -13,8 +13,6 @@ Examples
 
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 from antenna_drive.diagnosis.corrected import correct, Corrected

@@ -8,8 +8,6 @@ difference of the currents; the whole drive is simulated with either. A value th
 is never overruled. A note says what was inferred, and by how much the next best value is worse.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import cache
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """An investigation of the drive: how its tests are run, recorded and diagnosed."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path

@@ -8,8 +8,6 @@ some times between the samples, too, and a reading is interpolated between them 
 slopes. To first order alone, a delay of 7 ms at 5 Hz is off by 2 percent of the signal.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 import math

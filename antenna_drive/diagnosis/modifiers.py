@@ -6,8 +6,6 @@ What a parameter does: it modifies the run before it is simulated, or the readin
 Each entry of the catalogue, and each tolerance, declares its modifier where it stands.
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Planned tests: the built-in ones, and which effects a set of tests can tell apart."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 

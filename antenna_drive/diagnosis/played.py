@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The parameters of the drive's nodes that make a test sheet come true."""
 
-from __future__ import annotations
-
 from antenna_drive.diagnosis.sheet_settings import as_the_sheet_says
 from antenna_drive.emulator.units import home
 from antenna_drive.emulator.wiring import TEST_SIGNAL

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A recording predicted from its rate command and test sheet alone."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 import math

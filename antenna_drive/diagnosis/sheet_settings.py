@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a test sheet sets in the drive: the circuits of Table 1, the elevation, the bias."""
 
-from __future__ import annotations
-
 from functools import cache, reduce
 import math
 from typing import Any

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Whether the columns of a recording can be of this drive: units, and what is in them."""
 
-from __future__ import annotations
-
 import math
 
 from antenna_drive.diagnosis.field_recording import FieldRecording, Note

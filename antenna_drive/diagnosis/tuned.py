@@ -8,8 +8,6 @@ numbers is several times closer to it than one with the numbers of the drawing. 
 is beyond the tolerances: the machine is not the one of the configuration.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 import tempfile

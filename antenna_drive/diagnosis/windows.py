@@ -10,8 +10,6 @@ start of the motion is preferred, because the drive stood still before. The stat
 a motion is not known; such a part is simulated for a while before it is compared.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 import math

@@ -6,8 +6,6 @@ The catalogue in plain words: what is said of each effect's number, and what to 
 The words are in words.yaml. What a number is compared with is looked up in the drive's record.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
