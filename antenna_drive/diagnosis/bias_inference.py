@@ -203,19 +203,12 @@ def _source(time: FloatArray, voltage: FloatArray) -> CircuitBias | FixedBias | 
 
 @dataclass(frozen=True)
 class _Fit:
-    """
-    How well one circuit fits all recordings.
+    """How well one circuit fits all recordings."""
 
-    misfit : mean of what is off [V]
-    scale : what the pot does over what the sheets say of it; 1 if they do not
-    settings : of the pot, for each recording: that of its sheet, or one that fits
-    starts : of the circuit, for each recording
-    """
-
-    misfit: float
-    scale: float
-    settings: tuple[float, ...]
-    starts: tuple[str, ...]
+    misfit: float  # mean of what is off [V]
+    scale: float  # what the pot does over what the sheets say of it; 1 if they do not
+    settings: tuple[float, ...]  # of the pot, by recording: that of its sheet, or one that fits
+    starts: tuple[str, ...]  # of the circuit, by recording
 
     @property
     def pots(self) -> tuple[float, ...]:

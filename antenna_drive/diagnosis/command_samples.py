@@ -42,46 +42,32 @@ _STILL, _NEAR = 4, 0.05
 
 @dataclass(frozen=True)
 class Jumps:
-    """
-    Where a command jumps.
+    """Where a command jumps."""
 
-    interval : between which samples, by the number of the first of the two, shape (k,)
-    time : of each jump, shape (k,) [s]
-    left, right : first and second derivative of the command at the samples before and behind each
-        jump, 0 where it is level there, shape (k, 2) [rad/s^2], [rad/s^3]
-    """
-
-    interval: NDArray[np.int64]
-    time: FloatArray
+    interval: NDArray[np.int64]  # between which samples: number of the first of two, shape (k,)
+    time: FloatArray  # of each jump, shape (k,) [s]
+    # first and second derivative of the command at the samples before and behind each jump, 0
+    # where it is level there, shape (k, 2) [rad/s^2], [rad/s^3]
     left: FloatArray
     right: FloatArray
 
 
 @dataclass(frozen=True)
 class CommandCorners:
-    """
-    Where two straight lines of a command meet between two samples.
+    """Where two straight lines of a command meet between two samples."""
 
-    sample, time : number of the sample before each corner, and its time, shape (m,) [s]
-    before, after : slopes on both sides, shape (m,) [rad/s^2]
-    """
-
-    sample: NDArray[np.int64]
-    time: FloatArray
-    before: FloatArray
-    after: FloatArray
+    sample: NDArray[np.int64]  # number of the one before each corner, shape (m,)
+    time: FloatArray  # of each corner, shape (m,) [s]
+    before: FloatArray  # slope before each, shape (m,) [rad/s^2]
+    after: FloatArray  # slope behind each, shape (m,) [rad/s^2]
 
 
 @dataclass(frozen=True)
 class CommandSamples:
-    """
-    The samples of a command, and what lies in the n - 1 intervals between them.
+    """The samples of a command, and what lies in the n - 1 intervals between them."""
 
-    time, value : shape (n,) [s], [rad/s]
-    """
-
-    time: FloatArray
-    value: FloatArray
+    time: FloatArray  # shape (n,) [s]
+    value: FloatArray  # shape (n,) [rad/s]
 
     @cached_property
     def _slope(self) -> FloatArray:

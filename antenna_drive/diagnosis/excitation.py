@@ -87,19 +87,12 @@ class Bias:
 
 @dataclass(frozen=True)
 class Longest:
-    """
-    How long a step of the integration may be.
+    """How long a step of the integration may be."""
 
-    usual : at most so long [s]
-    shortest : even where a wave asks for less [s]
-    wave : angle by which a wave may turn in a step [rad]
-    cycles : of the fastest wave per turn of the axis, 0 for none
-    """
-
-    usual: float
-    shortest: float = 0.0
-    wave: float = math.inf
-    cycles: float = 0.0
+    usual: float  # at most so long [s]
+    shortest: float = 0.0  # even where a wave asks for less [s]
+    wave: float = math.inf  # angle by which a wave may turn in a step [rad]
+    cycles: float = 0.0  # of the fastest wave per turn of the axis, 0 for none
 
     def at(self, rate: FloatArray) -> FloatArray:
         """Return the longest step where the axis turns at these rates [rad/s], as an array."""

@@ -45,36 +45,21 @@ Note = Callable[[str], None]
 
 @dataclass(frozen=True)
 class FieldRecording:
-    """
-    A recording as all its windows share it; time counts from the start of the test.
+    """A recording as all its windows share it; time counts from the start of the test."""
 
-    name : for people
-    sheet : what the tester knows
-    command : axis rate command
-    rates : its samples
-    readings : those that were recorded, by their short names, without spikes
-    time : of the samples of the reading with most of them, spikes included, shape (n,) [s]
-    is_planned : the readings are not measured
-    later_s : how much longer the recording is than what was looked at [s]
-    """
-
-    name: str
-    sheet: sheets.TestSheet
-    command: SheetCommand | RecordedCommand
-    rates: Channel
-    readings: dict[str, Channel]
-    time: FloatArray
-    is_planned: bool
-    later_s: float = 0.0
+    name: str  # for people
+    sheet: sheets.TestSheet  # what the tester knows
+    command: SheetCommand | RecordedCommand  # axis rate command
+    rates: Channel  # its samples
+    readings: dict[str, Channel]  # those that were recorded, by short names, without spikes
+    time: FloatArray  # of the reading with most samples, spikes included, shape (n,) [s]
+    is_planned: bool  # the readings are not measured
+    later_s: float = 0.0  # how much longer the recording is than what was looked at [s]
 
     @classmethod
     def of(cls, name: str, recording: Recording, note: Note) -> FieldRecording:
         """
-        Check and clean a recording with its test sheet.
-
-        name : for people
-        recording : with its test sheet
-        note : called with what was inferred or is missing
+        Check and clean a recording; `note` is called with what was inferred or is missing.
 
         Raises UserError: the rate command is missing, or there is no reading to compare, or nearly
         none.
@@ -123,11 +108,7 @@ class FieldRecording:
         return float(self.rates.time_s[np.argmax(moving)] if moving.any() else self.time[0])
 
     def command_between(self, begin: float, compared: float, end: float) -> CommandedRate:
-        """
-        Return the command of a window, in a time that counts from its beginning.
-
-        begin, compared, end : of the window, see `Window` [s]
-        """
+        """Return the command of a window, see `Window`, in a time that counts from its begin."""
         if begin == 0.0 and compared < _CLOCK_S and isinstance(self.command, SheetCommand):
             return self.command
         # later, the recorder's clock is off by more than its samples tell the command

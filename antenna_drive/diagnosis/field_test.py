@@ -48,43 +48,28 @@ _FORGOTTEN_S = 2.0
 
 @dataclass(frozen=True)
 class FieldTest:
-    """
-    A window of a recording, prepared; its time counts from the beginning of the window.
+    """A window of a recording, prepared; its time counts from the beginning of the window."""
 
-    name : for people
-    record : of the drive as configured and as the sheet says, shape (1,)
-    command : axis rate command
-    bias : source of bias voltage, where the share circuit is not connected
-    time : of the samples that are compared, shape (n,) [s]
-    measured : readings, shape (n, c), NaN where there is none
-    slope : their slopes over time as recorded, shape (n, c), NaN where there is none
-    sensors : what they add
-    jitter : of the time stamps [s]
-    period : between two recorded samples [s]
-    sheet : what the tester knows, and what was inferred
-    known_start : False if the simulation begins in the middle of a motion, whose state is not
-        known; the zero of the encoder then follows from the readings alone
-    start_angle : of the axis at the beginning of the window, since that of the recording [rad];
-        waves go on where they were
-    labels : what was different in this test, by its sheet
-    excerpt : of the recording
-    """
-
-    name: str
+    name: str  # for people
+    # of the drive as configured and as the sheet says, shape (1,)
     record: np.ndarray[Any, np.dtype[Any]]
-    command: CommandedRate
-    bias: Bias
-    time: FloatArray
-    measured: FloatArray
-    slope: FloatArray
-    sensors: SensorModel
-    jitter: float
-    period: float
-    sheet: sheets.TestSheet
+    command: CommandedRate  # of the axis
+    bias: Bias  # source of bias voltage, where the share circuit is not connected
+    time: FloatArray  # of the samples that are compared, shape (n,) [s]
+    measured: FloatArray  # readings, shape (n, c), NaN where there is none
+    slope: FloatArray  # their slopes over time as recorded, shape (n, c), NaN where there is none
+    sensors: SensorModel  # what they add
+    jitter: float  # of the time stamps [s]
+    period: float  # between two recorded samples [s]
+    sheet: sheets.TestSheet  # what the tester knows, and what was inferred
+    # False if the simulation begins in the middle of a motion, whose state is not known; the zero
+    # of the encoder then follows from the readings alone
     known_start: bool = True
+    # of the axis at the beginning of the window, since that of the recording [rad]; waves go on
+    # where they were
     start_angle: float = 0.0
-    labels: Mapping[str, str] = field(default_factory=dict)
-    excerpt: Excerpt | None = None
+    labels: Mapping[str, str] = field(default_factory=dict)  # what was different, by the sheet
+    excerpt: Excerpt | None = None  # of the recording
 
     @cached_property
     def output_times(self) -> FloatArray:
@@ -153,11 +138,8 @@ def prepared(recordings: Mapping[str, Recording], drive: Drive, note: Note) -> l
     """
     Make recordings of one machine ready: the windows that tell most, each a test of its own.
 
-    recordings : with their test sheets, by name
-    drive : the configuration
-    note : called with what was inferred or is missing
-
-    Raises UserError: a recording lacks the rate command or readings, or cannot be of this drive.
+    `note` is called with what was inferred or is missing. Raises UserError: a recording lacks the
+    rate command or readings, or cannot be of this drive.
     """
     found = [FieldRecording.of(name, recording, note) for name, recording in recordings.items()]
     for recording in found:

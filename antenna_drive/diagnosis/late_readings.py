@@ -75,12 +75,10 @@ class RipplingTachometer:
     A tachometer whose ripple may be faster than the outputs of a run.
 
     What is interpolated is the motion of its rotor, from which the reading follows.
-
-    angle : of its rotor at each output, shape (n,) [rad]
-    numbers : its record, shape (1,), see `parameters.sets.Tachometer`
     """
 
-    angle: FloatArray
+    angle: FloatArray  # of its rotor at each output, shape (n,) [rad]
+    # its record, shape (1,), see `parameters.sets.Tachometer`
     numbers: np.ndarray[Any, np.dtype[Any]]
 
     def read_at(self, time: FloatArray, out: FloatArray, wanted: FloatArray,
@@ -100,15 +98,10 @@ class RipplingTachometer:
 
 @dataclass(frozen=True)
 class Outputs:
-    """
-    What a run gives at the output times.
+    """What a run gives at the output times."""
 
-    values : and slopes of n channels, shape (times, n, 2)
-    rippling : tachometers with a ripple, by the names of their readings
-    """
-
-    values: FloatArray
-    rippling: Mapping[str, RipplingTachometer]
+    values: FloatArray  # and slopes of n channels, shape (times, n, 2)
+    rippling: Mapping[str, RipplingTachometer]  # those with a ripple, by names of readings
 
 
 @compiled

@@ -49,16 +49,11 @@ def recorder_errors(entries: Iterable[Mapping[str, Any]]) -> SensorReadings:
 
 @dataclass(frozen=True)
 class Prediction:
-    """
-    A recording and its prediction, at all of its times.
+    """A recording and its prediction, at all of its times."""
 
-    time : of the samples, as recorded, shape (n,) [s]
-    measured, predicted : shape (n, c); NaN where nothing was measured
-    """
-
-    time: FloatArray
-    measured: FloatArray
-    predicted: FloatArray
+    time: FloatArray  # of the samples, as recorded, shape (n,) [s]
+    measured: FloatArray  # readings, shape (n, c); NaN where there is none
+    predicted: FloatArray  # readings, shape (n, c)
 
     def rms(self) -> dict[str, tuple[float, str]]:
         """Return the rms of measured minus predicted of each signal, with its unit."""
@@ -81,11 +76,8 @@ class Prediction:
 def predict(name: str, recording: Recording, drive: Drive, recorder: SensorReadings | None = None,
             note: Note = lambda text: None) -> Prediction:
     """
-    Predict a recording from its rate command and its test sheet.
+    Predict a recording, whose readings are compared and not used.
 
-    name : for people
-    recording : its readings are compared and not used
-    drive : the configuration
     recorder : its errors; None for none
     note : called with what was inferred or is missing
 

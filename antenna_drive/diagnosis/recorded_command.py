@@ -20,24 +20,17 @@ _APART_S = 1e-9
 
 @dataclass(frozen=True)
 class RecordedCommand:
-    """
-    A command that is known from its samples: cubic between jumps, straight beside corners.
+    """A command that is known from its samples: cubic between jumps, straight beside corners."""
 
-    time, value : of the samples, and of both sides of each jump, shape (n,) [s], [rad/s]
-    slope : at the two ends of each interval between them, shape (n - 1, 2) [rad/s^2]
-    jumps : times at which the command jumps, shape (k,) [s]
-    slack : by how much each jump may come earlier (negative) and later, shape (k, 2) [s]: up to
-        the samples on its two sides
-    holes : begin and end of each interval whose rows are missing and not told by those around it,
-        shape (h, 2) [s]
-    uncertainty : by how much the command may be off in the middle of each hole, shape (h,) [rad/s]
-    """
-
-    time: FloatArray
-    value: FloatArray
-    slope: FloatArray
-    jumps: FloatArray
+    time: FloatArray  # of the samples, and of both sides of each jump, shape (n,) [s]
+    value: FloatArray  # at these times, shape (n,) [rad/s]
+    slope: FloatArray  # at both ends of each interval between them, shape (n - 1, 2) [rad/s^2]
+    jumps: FloatArray  # times at which the command jumps, shape (k,) [s]
+    # by how much each jump may come earlier (negative) and later, shape (k, 2) [s]: up to the
+    # samples on its two sides
     slack: FloatArray
+    # begin and end of each interval whose rows are missing and not told by those around it, shape
+    # (h, 2) [s], and by how much the command may be off in the middle of each, shape (h,) [rad/s]
     holes: FloatArray
     uncertainty: FloatArray
 

@@ -35,14 +35,10 @@ _NOISE = 3.0
 
 @dataclass(frozen=True)
 class Tuned:
-    """
-    What a quiet record shows of a drive.
+    """What a quiet record shows of a drive."""
 
-    text : of a configuration file with the tolerances as they were fitted
-    outside : what the record has beyond all tolerances, a line for each signal, the greatest first
-    """
-
-    text: str
+    text: str  # of a configuration file with the tolerances as they were fitted
+    # what the record has beyond all tolerances, a line for each signal, the greatest first
     outside: tuple[str, ...] = ()
 
 
@@ -50,10 +46,8 @@ def tuned(recording: Recording, drive: Drive) -> Tuned:
     """
     Return the configuration with the tolerances as a quiet record shows them, and what is beyond.
 
-    recording : of a healthy drive that stood still at the beginning, with its test sheet
-    drive : the configuration
-
-    Raises UserError: the recording cannot be compared with the drive.
+    The healthy drive of the record stood still at the beginning. Raises UserError: the recording
+    cannot be compared with the drive.
     """
     machine = AntennaMachine({'quiet record': recording}, drive, threads=1)
     problem = LeastSquares(machine)
