@@ -116,7 +116,7 @@ class CommandSamples:
         right = CommandSamples(-self.time[::-1], self.value[::-1])._cut_off()[::-1] * [-1.0, 1.0]
         left[lacks_rows] = right[lacks_rows] = 0.0
         k = np.flatnonzero(large | left.any(axis=1) | right.any(axis=1))
-        return Jumps(k, regular_times(self.time[k], self.time[k + 1])[0], left[k], right[k])
+        return Jumps(k, regular_times(self.time[k], self.time[k + 1]), left[k], right[k])
 
     @property
     def _level(self) -> NDArray[np.bool_]:
@@ -202,17 +202,15 @@ class CommandSamples:
         return slopes
 
 
-def regular_times(after: FloatArray, before: FloatArray,
-                  ) -> tuple[FloatArray, NDArray[np.bool_]]:
+def regular_times(after: FloatArray, before: FloatArray) -> FloatArray:
     """
     Return times that lie in intervals: those of a regular sequence, if there is one in all.
 
     A computer jumps at regular times, which many intervals tell more precisely than each its own.
-    Beside the times, says which of them belong to a regular sequence, shape (n,) each.
 
     after, before : ends of the intervals, shape (n,) [s]
     """
-    found, regular = 0.5 * (after + before), np.zeros(after.size, dtype=bool)
+    found = 0.5 * (after + before)
     # the first jump begins the motion, and may belong to no sequence
     sequences = [(first, cycle, np.arange(after.size - first) // cycle)
                  for first, cycle in product((0, 1), _CYCLES)
@@ -222,9 +220,9 @@ def regular_times(after: FloatArray, before: FloatArray,
     for first, cycle, number in sequences:
         fit = _periodic(after[first:], before[first:], cycle, number)
         if fit is not None:
-            found[first:], regular[first:] = fit, True
+            found[first:] = fit
             break
-    return found, regular
+    return found
 
 
 def _on_a_grid(after: FloatArray, before: FloatArray) -> NDArray[np.int64] | None:
@@ -246,17 +244,12 @@ def _on_a_grid(after: FloatArray, before: FloatArray) -> NDArray[np.int64] | Non
 def _periodic(after: FloatArray, before: FloatArray, cycle: int, number: NDArray[np.int64],
               ) -> FloatArray | None:
     """Return the periodic sequence that keeps farthest from the ends of all intervals."""
-    place = np.arange(after.size)
     # unknown: time of each jump of the first cycle, period, margin to the ends
-    lines = np.zeros((after.size, cycle + 2))
-    lines[place, place % cycle] = 1.0
-    lines[:, cycle] = number
-    lines[:, cycle + 1] = 1.0
-    other_end = lines.copy()
-    other_end[:, :-1] *= -1.0
+    lines = np.column_stack([np.eye(cycle)[np.arange(after.size) % cycle], number])
+    margin = np.ones((after.size, 1))
     start = after[0]
-    fit = linprog(np.r_[np.zeros(cycle + 1), -1.0], np.vstack([lines, other_end]),
+    fit = linprog(np.r_[np.zeros(cycle + 1), -1.0], np.block([[lines, margin], [-lines, margin]]),
                   np.r_[before - start, start - after], bounds=(None, None))
     if fit.status != 0 or fit.x[-1] <= 0.0:
         return None
-    return np.asarray(start + lines[:, :-1] @ fit.x[:-1])
+    return np.asarray(start + lines @ fit.x[:-1])

@@ -9,6 +9,7 @@ part of the machine: they are returned beside it.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import Any
 
 from antenna_drive.diagnosis.catalogue import EXTRA_MODE
@@ -16,7 +17,6 @@ from antenna_drive.diagnosis.excitation import Bias
 from antenna_drive.diagnosis.modifiers import (
     AntennaParameter, ReadingModifier, RecorderError, RunModifier, RunSetup, SCALE,
 )
-from antenna_drive.diagnosis.sheet_settings import value_of
 from antenna_drive.parameters.loading import load, PLACES
 from antenna_drive.parameters.records import place_of, record_of
 from antenna_drive.parameters.sets import changed, Drive, values
@@ -64,7 +64,7 @@ def correct(drive: Drive, records: Sequence[np.ndarray[Any, np.dtype[Any]]],
         alone, _, _ = _written(given, [
             (p, value) for p, value in fitted if owner.get(p.name) == effect])
         for path, value in alone.items():
-            if value != value_of(given, path):
+            if value != attrgetter(path)(given):
                 why[path] = _EFFECT + effect
     reference = {path: value for path, _, value in values(load())}
     lines: dict[str, list[tuple[str, str, Any]]] = {}
@@ -116,7 +116,7 @@ def _written(drive: Drive, fitted: Sequence[tuple[AntennaParameter, float]],
             missing.append(item)
     run.write_waves()
     pot = place_of(kind, _POT)
-    before = float(value_of(drive, _POT))
+    before = drive.torque_share.circuit.bias_pot
     if run.numbers[pot] != before:
         # the pot is set for each test, and its sheet says how
         for path in _LIKE_THE_POT:

@@ -49,7 +49,7 @@ class FieldRecording:
 
     name: str  # for people
     sheet: sheets.TestSheet  # what the tester knows
-    command: SheetCommand | RecordedCommand  # axis rate command
+    command: CommandedRate  # axis rate command
     rates: Channel  # its samples
     readings: dict[str, Channel]  # those that were recorded, by short names, without spikes
     time: FloatArray  # of the reading with most samples, spikes included, shape (n,) [s]
@@ -170,7 +170,7 @@ def _from_its_start(name: str, recording: Recording, note: Note) -> Recording:
 
 
 def _command(name: str, waveform: sheets.Waveform | None, given: Channel,
-             note: Note) -> SheetCommand | RecordedCommand:
+             note: Note) -> CommandedRate:
     if waveform is None:
         note(f'{name}: no waveform in the sheet, the recorded command was interpolated')
     elif _is(exact := SheetCommand(waveform), given):

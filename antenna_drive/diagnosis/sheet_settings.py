@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a test sheet sets in the drive: the circuits of Table 1, the elevation, the bias."""
 
-from functools import cache, reduce
+from functools import cache
 import math
+from operator import attrgetter
 from typing import Any
 
 from antenna_drive.diagnosis.excitation import Bias
@@ -37,12 +38,7 @@ def nearest_circuit(drive: Drive, entry: str) -> str:
 
 def _numbers(drive: Drive, entry: str) -> dict[str, float]:
     part, keys = _NUMBERS[entry]
-    return {path: float(value_of(drive, path)) for path in (f'{part}.{key}' for key in keys)}
-
-
-def value_of(drive: Drive, path: str) -> Any:
-    """Return what a configuration says of a dotted name."""
-    return reduce(getattr, path.split('.'), drive)
+    return {path: float(attrgetter(path)(drive)) for path in (f'{part}.{key}' for key in keys)}
 
 
 def as_the_sheet_says(sheet: sheets.TestSheet, drive: Drive) -> tuple[Drive, Bias]:
