@@ -1,13 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""
-The tests that the drive may run, as the design of the next test asks for them.
-
-They are waveforms of several families, with their amplitudes and periods.
-"""
+"""The tests that the drive may run, as the design of the next test asks for them."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -143,25 +139,19 @@ FAMILIES: Mapping[str, Callable[[_Draw], Waveform]] = {
 
 class AntennaTests(TestSpace):
     """
-    The tests that the drive may run.
+    The tests of a `duration` [s] that the drive may run.
 
-    base : what a further test shares with those that were made; its waveform and start do not
-        count
-    drive : the configuration
-    limits : of the drive
-    duration : of a test [s]
+    `base` is what a further test shares with those that were made.
     """
 
     families = tuple(FAMILIES)
 
     def __init__(self, base: TestSheet, drive: Drive, limits: DriveLimits,
                  duration: float = 30.0) -> None:
-        """Take what all the tests have in common."""
         # the waveform is what is looked for; a proposal is a test from rest
         self._base = replace(base, waveform=None, start='rest')
-        self._drive, self._limits = drive, limits
-        self._duration = duration
-        self.limits = limits.as_data()
+        self._drive, self._limits, self._duration = drive, limits, duration
+        self.limits = asdict(limits)
 
     def draw(self, family: str, random: np.random.Generator) -> TestSheet:
         """Return the sheet of a test of a family."""
@@ -184,9 +174,8 @@ class AntennaTests(TestSpace):
         if which == 0 and isinstance(test.bias, CircuitBias) and test.bias.bias_pot:
             return _with_pot(test, scale)
         if isinstance(waveform, Knots):
-            assert waveform.rates_deg_s is not None
-            return replace(test, waveform=replace(waveform, rates_deg_s=tuple(
-                _rounded(scale * rate) for rate in waveform.rates_deg_s)))
+            rates = _numbers(scale * np.array(waveform.rates_deg_s))
+            return replace(test, waveform=replace(waveform, rates_deg_s=rates))
         if which == 1 and isinstance(waveform, (Square, Triangle)) and waveform.period_s:
             name = 'period_s'
         return replace(test, waveform=replace(
@@ -199,7 +188,8 @@ class AntennaTests(TestSpace):
 
     def use(self, machine: Machine, points: Sequence[Point]) -> Mapping[str, float]:
         """Return the share of each limit that a test uses, the worst of some variants."""
-        shares = [self._limits.use(*_outputs(machine, point, CHANNELS), self._drive)
+        assert isinstance(machine, AntennaMachine)
+        shares = [self._limits.use(*machine.outputs(point, 0, CHANNELS), self._drive)
                   for point in points]
         return {name: max(share[name] for share in shares) for name in shares[0]}
 
@@ -219,7 +209,8 @@ class AntennaTests(TestSpace):
 
     def unread(self, machine: Machine, one: Point, other: Point) -> Mapping[str, float]:
         """Return by how much two variants differ in what no sensor reads, see `TestSpace`."""
-        first, second = (_outputs(machine, point, tuple(_UNREAD))[1][:, :, 0]
+        assert isinstance(machine, AntennaMachine)
+        first, second = (machine.outputs(point, 0, tuple(_UNREAD))[1][:, :, 0]
                          for point in (one, other))
         size = np.sqrt(np.mean((first - first.mean(axis=0)) ** 2, axis=0))
         off = np.sqrt(np.mean((second - first) ** 2, axis=0)) / np.maximum(size, 1e-12)
@@ -231,9 +222,3 @@ def _with_pot(sheet: TestSheet, scale: float) -> TestSheet:
     bias = sheet.bias
     assert isinstance(bias, CircuitBias) and bias.bias_pot is not None
     return replace(sheet, bias=replace(bias, bias_pot=_rounded(min(bias.bias_pot * scale, 1.0))))
-
-
-def _outputs(machine: Machine, point: Point,
-             channels: tuple[str, ...]) -> tuple[FloatArray, FloatArray]:
-    assert isinstance(machine, AntennaMachine)
-    return machine.outputs(point, 0, channels)

@@ -10,8 +10,7 @@ only by what `BEYOND` says. What it may not do is stay there, see `hot_s`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields, replace
 import math
 from pathlib import Path
 
@@ -64,33 +63,26 @@ class DriveLimits:
             voltage_V=BEYOND * armature.voltage_limit, axis_torque_N_m=BEYOND * torque,
             hot_current_A=_HOT * motor.current_limit, hot_s=_HOT_S)
 
-    def as_data(self) -> dict[str, float]:
-        """Return the limits by name."""
-        return asdict(self)
-
     def use(self, time: FloatArray, out: FloatArray, drive: Drive) -> dict[str, float]:
         """
         Return the share of each limit that a simulated test uses, 1 at the limit.
 
         time : shape (n,) [s]
         out : values and slopes of `CHANNELS`, shape (n, 8, 2)
-        drive : the configuration
         """
-        value, slope = (dict(zip(CHANNELS, out[:, :, k].T, strict=True)) for k in (0, 1))
-        armature, ratio = drive.motor_1.armature, drive.motor_1.gear_ratio
-        current = _of_motors(value, 'current')
+        armature = drive.motor_1.armature
+        (rate, angle), (acceleration, _) = out[:, :2, 0].T, out[:, :2, 1].T
+        current, torque, tach = np.split(out[:, 2:], 3, axis=1)
         voltage = (armature.physical_amperes_per_article_ampere * (
-            armature.inductance * _of_motors(slope, 'current') + armature.resistance * current)
-            + armature.back_emf_constant * _of_motors(value, 'tach_rate'))
-        angle = value['plant/axis_angle']
-        hot = np.gradient(time) @ (np.abs(current) > self.hot_current_A)
+            armature.inductance * current[:, :, 1] + armature.resistance * current[:, :, 0])
+            + armature.back_emf_constant * tach[:, :, 0])
+        hot = np.gradient(time) @ (np.abs(current[:, :, 0]) > self.hot_current_A)
         reached = {
-            'rate_deg_s': math.degrees(_greatest(value['plant/axis_rate'])),
-            'acceleration_deg_s2': math.degrees(_greatest(slope['plant/axis_rate'])),
+            'rate_deg_s': math.degrees(_greatest(rate)),
+            'acceleration_deg_s2': math.degrees(_greatest(acceleration)),
             'travel_deg': math.degrees(_greatest(angle - angle.min())),
-            'current_A': _greatest(current), 'voltage_V': _greatest(voltage),
-            'axis_torque_N_m': ratio * _greatest(
-                _of_motors(value, 'gear_torque').sum(axis=1)),
+            'current_A': _greatest(current[:, :, 0]), 'voltage_V': _greatest(voltage),
+            'axis_torque_N_m': drive.motor_1.gear_ratio * _greatest(torque[:, :, 0].sum(axis=1)),
             'hot_s': _greatest(hot)}
         return {name: amount / getattr(self, name) for name, amount in reached.items()}
 
@@ -110,11 +102,6 @@ def read_limits(path: Path, drive: Drive) -> DriveLimits:
             name: known[name].check(name, value) for name, value in given.items()})
     except ParameterError as error:
         raise ParameterError(f'{path}: {error}') from None
-
-
-def _of_motors(values: Mapping[str, FloatArray], signal: str) -> FloatArray:
-    """Return a signal of both motors, shape (n, 2)."""
-    return np.stack([values[f'{motor}/{signal}'] for motor in MOTORS], axis=1)
 
 
 def _greatest(values: FloatArray) -> float:

@@ -98,16 +98,10 @@ def schedule(command: CommandedRate, bias: Bias, samples: FloatArray, longest: L
     delay : by which the command comes late [s]
     """
     end = float(samples[-1])
-    jumps = command.knots(end) + delay
-    if delay > 0.0:
-        jumps = np.r_[delay, jumps]
-    if 0.0 < bias.at < end:
-        jumps = np.r_[jumps, bias.at]
-    jumps = jumps[(jumps > 0.0) & (jumps < end)]
-    knots = np.unique(np.r_[0.0, samples, jumps])
+    jumps = np.r_[command.knots(end) + delay, delay, bias.at]
+    knots = np.unique(np.r_[0.0, samples, jumps[(jumps > 0.0) & (jumps < end)]])
     # a jump on a sample needs no step of its own
-    keep = np.r_[True, np.diff(knots) > 1e-9]
-    knots = knots[keep]
+    knots = knots[np.r_[True, np.diff(knots) > 1e-9]]
     rate = command(0.5 * (knots[:-1] + knots[1:]) - delay)
     asked = longest.wave / np.maximum(longest.cycles * np.abs(rate), 1e-9)
     allowed = np.minimum(longest.usual, np.maximum(longest.shortest, asked))

@@ -49,7 +49,7 @@ class DriveBench(Bench):
                  threads: int = 2) -> None:
         """Keep what the drive is."""
         self.space = AntennaTests(base, drive, limits, plan.duration)
-        self.limits = limits.as_data()
+        self.limits = self.space.limits
         self._drive, self._base, self._play, self._seed = drive, base, play, plan.seed
         self._sensors, self._threads = sensors, threads
 
