@@ -97,6 +97,27 @@ class FieldRecording:
         return float(np.median(np.diff(self.rates.time_s)))
 
     @property
+    def jitter(self) -> float:
+        """
+        Return by how much time stamps are off [s]: by what an exactly known command differs.
+
+        Where the command tells nothing, a hundredth of the spacing is assumed.
+        """
+        usual = 0.01 * self.period
+        if isinstance(self.command, RecordedCommand):
+            return usual
+        time, values = self.rates.time_s, self.rates.values
+        error = self.command(time) - values
+        slope = (self.command(time + 1e-4) - self.command(time - 1e-4)) / 2e-4
+        # jumps and corners of the command say nothing about time
+        good = ((np.abs(error) < 0.02 * np.ptp(values))
+                & (np.abs(slope) > 0.3 * np.abs(slope).max()))
+        if np.count_nonzero(good) < 50 or not np.any(slope[good]):
+            return usual
+        late = error[good] / slope[good]
+        return max(float(1.4826 * np.median(np.abs(late - np.median(late)))), 0.1 * usual)
+
+    @property
     def end(self) -> float:
         """Return the time of the last sample that can be compared [s]."""
         return float(self.time[-1])

@@ -18,7 +18,7 @@ from antenna_drive.diagnosis.inference import completed
 from antenna_drive.diagnosis.late_readings import dense, lagging, Outputs, parts_of, read_at
 from antenna_drive.diagnosis.modifiers import SensorReadings
 from antenna_drive.diagnosis.recorded_command import RecordedCommand
-from antenna_drive.diagnosis.sensors import jitter_of, SensorModel, slips
+from antenna_drive.diagnosis.sensors import SensorModel, slips
 from antenna_drive.diagnosis.sheet_settings import as_the_sheet_says
 from antenna_drive.diagnosis.suitability import check
 from antenna_drive.diagnosis.windows import Window, windows
@@ -97,7 +97,6 @@ class FieldTest:
         """
         Return the readings of a run, shape (n, c).
 
-        out : of the run, all readings
         errors : of the sensors, which nothing feeds back
         digits : readings of the encoder in digits, shape (n,); None if they tell none
         """
@@ -169,11 +168,10 @@ def window_of(recording: FieldRecording, window: Window, drive: Drive, bias: Bia
     if isinstance(command, RecordedCommand):
         for begin, end in command.holes + window.begin:
             measured[(time > begin) & (time < end + _FORGOTTEN_S)] = np.nan
-    resting = measured[time < recording.onset]
+    resting = measured[:np.searchsorted(time, recording.onset)]
     for tachometer in of(TACHOMETER):
         rates = resting[:, AT[tachometer.name]]
         rates[slips(rates, sensors.errors(tachometer).scatter)] = np.nan
-    measured[time < recording.onset] = resting
     angle = 0.0
     if window.begin > 0.0:
         drive = changed(drive, {'torque_share.circuit.start': 'steady'})
@@ -185,11 +183,9 @@ def window_of(recording: FieldRecording, window: Window, drive: Drive, bias: Bia
     if not math.isinf(window.end):
         name = f'{name} {window.compared:.0f}-{time[-1]:.0f} s'
     test = FieldTest(
-        name, record_of(drive), command,
-        bias.later(window.begin), time - window.begin, measured, slope,
-        sensors, jitter_of(recording.command, recording.rates.time_s, recording.rates.values),
-        recording.period, recording.sheet, window.known_start, angle,
-        dict(recording.sheet.labels or ()),
+        name, record_of(drive), command, bias.later(window.begin), time - window.begin, measured,
+        slope, sensors, recording.jitter, recording.period, recording.sheet, window.known_start,
+        angle, dict(recording.sheet.labels or ()),
         Excerpt(recording.name, recording.end + recording.later_s, window.begin))
     if not window.known_start:
         off = (measured - test.simulated(_STEP_S))[:, AT['encoder']]

@@ -13,6 +13,8 @@ from antenna_drive.readings import RATE_COMMAND, SIGNALS
 from antenna_drive.recording.recording import Recording
 from antenna_drive.recording.sheet import CircuitBias, parse_sheet, Square, TestSheet
 import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import breadth_first_order
 from simgap.next_test.confusability import Confusability, confusability
 
 BUILT_IN: Mapping[str, TestSheet] = {
@@ -45,15 +47,11 @@ def planned(sheet: TestSheet, duration: float, rate: float) -> Recording:
 def confusability_of(tests: Mapping[str, Recording], drive: Drive,
                      progress: Callable[[float], None] = lambda share: None,
                      threads: int = 2) -> Confusability:
-    """
-    Say which effects these tests, planned or made ones by name, can tell apart.
-
-    `progress` gets the share that is done; `threads` simulations run at once.
-    """
+    """Say which effects these tests, planned or made ones by name, can tell apart."""
     machine = AntennaMachine(tests, drive, threads)
-    machine.experiments = tuple(replace(e, measured=machine.predict({}, k))
-                                for k, e in enumerate(machine.experiments))
-    return confusability(machine, progress)
+    return confusability(machine.with_experiments([
+        replace(e, measured=machine.predict({}, k))
+        for k, e in enumerate(machine.experiments)]), progress)
 
 
 def passing_for(found: Confusability, index: int, most: int) -> list[str]:
@@ -64,15 +62,10 @@ def passing_for(found: Confusability, index: int, most: int) -> list[str]:
 
 def groups(found: Confusability) -> list[list[str]]:
     """Return the groups of effects that pass for each other."""
-    left = set(range(len(found.effects)))
-    named = []
+    near, left, named = csr_array(found.alike > found.limit), list(range(len(found.effects))), []
     while left:
-        group = [min(left)]
-        left.discard(group[0])
-        for member in group:
-            near = [j for j in sorted(left) if found.alike[member, j] > found.limit]
-            group += near
-            left -= set(near)
+        group = breadth_first_order(near, left[0], return_predecessors=False).tolist()
+        left = [j for j in left if j not in group]
         if len(group) > 1:
             named.append([found.effects[j] for j in group])
     return named
