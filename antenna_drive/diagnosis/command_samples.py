@@ -53,16 +53,6 @@ class Jumps:
 
 
 @dataclass(frozen=True)
-class CommandCorners:
-    """Where two straight lines of a command meet between two samples."""
-
-    sample: NDArray[np.int64]  # number of the one before each corner, shape (m,)
-    time: FloatArray  # of each corner, shape (m,) [s]
-    before: FloatArray  # slope before each, shape (m,) [rad/s^2]
-    after: FloatArray  # slope behind each, shape (m,) [rad/s^2]
-
-
-@dataclass(frozen=True)
 class CommandSamples:
     """The samples of a command, and what lies in the n - 1 intervals between them."""
 
@@ -159,12 +149,17 @@ class CommandSamples:
         """
         found = self._uncertain
         found[self.jumps.interval] = False
-        found[self.corners.sample] = False
+        found[self.corners[0]] = False
         return np.flatnonzero(found)
 
     @cached_property
-    def corners(self) -> CommandCorners:
-        """Return where two straight lines meet between two samples."""
+    def corners(self) -> tuple[NDArray[np.int64], FloatArray, FloatArray, FloatArray]:
+        """
+        Return where two straight lines meet between two samples.
+
+        Number of the sample before each corner, its time [s], and the slopes before and behind it
+        [rad/s^2], shape (m,) each.
+        """
         time, slope = self.time, self._slope
         k = np.arange(2, slope.size - 2)
         before, after = slope[k - 1], slope[k + 1]
@@ -176,7 +171,7 @@ class CommandSamples:
         found = ((straight < _STRAIGHT * bend)
                  & (share > _ON_A_SAMPLE) & (share < 1.0 - _ON_A_SAMPLE))
         at = time[k] + share * (time[k + 1] - time[k])
-        return CommandCorners(k[found], at[found], before[found], after[found])
+        return k[found], at[found], before[found], after[found]
 
     @property
     def slopes(self) -> FloatArray:

@@ -88,12 +88,7 @@ class DriveLimits:
 
 
 def read_limits(path: Path, drive: Drive) -> DriveLimits:
-    """
-    Read limits from a file; what it does not give follows from the configuration.
-
-    Raises ParameterError: the file cannot be read or an entry is not allowed; the message names
-    both.
-    """
+    """Read limits, what a file lacks follows from the configuration; ParameterError if wrong."""
     tree = read_yaml(path)
     known = {item.name: item.metadata['entry'] for item in fields(DriveLimits)}
     try:

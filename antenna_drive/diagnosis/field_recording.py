@@ -98,11 +98,8 @@ class FieldRecording:
 
     @property
     def jitter(self) -> float:
-        """
-        Return by how much time stamps are off [s]: by what an exactly known command differs.
-
-        Where the command tells nothing, a hundredth of the spacing is assumed.
-        """
+        """Return by how much time stamps are off [s]: by what an exactly known command differs."""
+        # where the command tells nothing
         usual = 0.01 * self.period
         if isinstance(self.command, RecordedCommand):
             return usual

@@ -36,8 +36,6 @@ def completed(recordings: Sequence[FieldRecording], drive: Drive,
     """
     Return recordings of one machine with what their sheets lack, as far as they tell it.
 
-    recordings : to be completed
-    drive : the configuration, which holds for what cannot be inferred
     note : called with what was inferred, what is as configured, and what contradicts a sheet
     """
     found = list(recordings)

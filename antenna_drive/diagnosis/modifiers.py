@@ -244,13 +244,10 @@ def set_to(*fields: str) -> FieldChange:
 
 
 class KnownModifiers:
-    """
-    What parameters do, by their names: a point is plain numbers.
-
-    of_runs, of_readings : modifiers, each with the index of the one test that it acts on, or None
-    """
+    """What parameters do, by their names: a point is plain numbers."""
 
     def __init__(self) -> None:
+        # each with the index of the one test that it acts on, or None
         self.of_runs: dict[str, tuple[RunModifier, int | None]] = {}
         self.of_readings: dict[str, tuple[ReadingModifier, int | None]] = {}
 

@@ -11,27 +11,26 @@ from antenna_drive.diagnosis.machine import AntennaMachine
 from antenna_drive.parameters.sets import Drive
 from antenna_drive.readings import RATE_COMMAND, SIGNALS
 from antenna_drive.recording.recording import Recording
-from antenna_drive.recording.sheet import CircuitBias, parse_sheet, Square, TestSheet
+from antenna_drive.recording.sheet import (
+    Chirp, CircuitBias, Multisine, Square, TestSheet, Triangle,
+)
 import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import breadth_first_order
 from simgap.next_test.confusability import Confusability, confusability
 
 BUILT_IN: Mapping[str, TestSheet] = {
-    name: replace(parse_sheet({'waveform': waveform, 'start': 'rest', 'elevation_deg': elevation,
-                               'parameter_tolerance': 0.02}),
-                  bias=CircuitBias(start='steady'))
+    name: TestSheet(bias=CircuitBias(start='steady'), waveform=waveform, start='rest',
+                    elevation_deg=elevation, parameter_tolerance=0.02)
     for name, elevation, waveform in (
-        ('square', 45.0, {'type': 'square', 'amplitude_deg_s': 0.05, 'period_s': 6.3,
-                          'phase': 0.25}),
-        ('triangle', 30.0, {'type': 'triangle', 'amplitude_deg_s': 0.5, 'period_s': 6.0,
-                            'phase': 0.0}),
-        ('multisine', 60.0, {'type': 'multisine', 'amplitude_deg_s': 0.1,
-                             'frequencies_hz': [0.2, 0.5, 0.9, 1.7, 3.1, 5.3],
-                             'weights': [0.5, 0.4, 0.3, 0.2, 0.15, 0.1],
-                             'phases': [0.0, 1.0, 2.0, 3.0, 4.0, 5.0], 'start_s': 1.0}),
-        ('chirp', 60.0, {'type': 'chirp', 'amplitude_deg_s': 0.06, 'f0_hz': 0.1, 'f1_hz': 8.0,
-                         'duration_s': 28.0, 'start_s': 1.0}),
+        ('square', 45.0, Square(amplitude_deg_s=0.05, period_s=6.3, phase=0.25)),
+        ('triangle', 30.0, Triangle(amplitude_deg_s=0.5, period_s=6.0, phase=0.0)),
+        ('multisine', 60.0, Multisine(
+            amplitude_deg_s=0.1, frequencies_hz=(0.2, 0.5, 0.9, 1.7, 3.1, 5.3),
+            weights=(0.5, 0.4, 0.3, 0.2, 0.15, 0.1), phases=(0.0, 1.0, 2.0, 3.0, 4.0, 5.0),
+            start_s=1.0)),
+        ('chirp', 60.0, Chirp(
+            amplitude_deg_s=0.06, f0_hz=0.1, f1_hz=8.0, duration_s=28.0, start_s=1.0)),
     )
 }
 

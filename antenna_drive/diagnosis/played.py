@@ -16,9 +16,6 @@ def parameters_of(sheet: TestSheet, drive: Drive) -> dict[str, dict[str, Value]]
     """
     Return what to set on each node, by unit and name, so that the drive runs a test.
 
-    sheet : of the test
-    drive : the configuration of the nodes
-
     Raises UserError: there is no waveform, or the bias is to step in the middle of the test.
     """
     if sheet.waveform is None:

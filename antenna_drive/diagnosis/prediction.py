@@ -24,11 +24,7 @@ from simgap.machine.contract import FloatArray
 
 
 def recorder_errors(entries: Iterable[Mapping[str, Any]]) -> SensorReadings:
-    """
-    Take the entries of a verdict's `recorder`.
-
-    Raises UserError: an entry is none.
-    """
+    """Take the entries of a verdict's `recorder`; UserError if one is none."""
     found = SensorReadings()
     for entry in entries:
         try:
@@ -78,10 +74,8 @@ def predict(name: str, recording: Recording, drive: Drive, recorder: SensorReadi
     """
     Predict a recording, whose readings are compared and not used.
 
-    recorder : its errors; None for none
-    note : called with what was inferred or is missing
-
-    Raises UserError: the recording lacks its rate command or any reading, or the run diverged.
+    `recorder` has its errors; `note` is called with what was inferred or is missing. Raises
+    UserError: the recording lacks its rate command or any reading, or the run diverged.
     """
     test = FieldRecording.of(name, recording, note)
     predicted = _readings(test, *as_the_sheet_says(test.sheet, drive),

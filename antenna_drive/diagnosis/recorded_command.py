@@ -59,16 +59,15 @@ class RecordedCommand:
 
     def _with_corners(self, samples: CommandSamples) -> RecordedCommand:
         """Return the command with a corner wherever straight lines meet between two samples."""
-        corners = samples.corners
-        begin, value = samples.time[corners.sample], samples.value[corners.sample]
+        sample, time, before, after = samples.corners
+        begin, value = samples.time[sample], samples.value[sample]
         piece = np.searchsorted(self.time, begin, side='right') - 1
         slope = self.slope.copy()
-        slope[piece] = corners.before[:, np.newaxis]
+        slope[piece] = before[:, np.newaxis]
         return replace(
-            self, time=np.insert(self.time, piece + 1, corners.time),
-            value=np.insert(self.value, piece + 1,
-                            value + corners.before * (corners.time - begin)),
-            slope=np.insert(slope, piece + 1, np.tile(corners.after[:, np.newaxis], 2), axis=0))
+            self, time=np.insert(self.time, piece + 1, time),
+            value=np.insert(self.value, piece + 1, value + before * (time - begin)),
+            slope=np.insert(slope, piece + 1, np.tile(after[:, np.newaxis], 2), axis=0))
 
     def __call__(self, time: FloatArray) -> FloatArray:
         """Return the rate command [rad/s] at these times [s]."""

@@ -66,12 +66,12 @@ def tuned(recording: Recording, drive: Drive) -> Tuned:
 def _outside(problem: LeastSquares, state: FitState) -> tuple[str, ...]:
     """Return the signals of which a fit of the tolerances leaves more than noise."""
     [test] = problem.experiments
-    [predicted] = problem.machine.simulate([state.point()])[0]
+    predicted = problem.machine.predict(state.point(), 0)
     left = problem.residuals_of(state, 0)
     found = []
     for column, reading in enumerate(READINGS):
         there = np.isfinite(left[:, column])
-        if predicted is None or not there.any():
+        if not there.any():
             continue
         level = problem.scale * robust_level(left[there, column], DEFAULT.fit.outlier)
         if level > _NOISE:
@@ -82,11 +82,7 @@ def _outside(problem: LeastSquares, state: FitState) -> tuple[str, ...]:
 
 
 def loaded(text: str) -> Drive:
-    """
-    Return the drive of a configuration file that is kept as text.
-
-    Raises ParameterError: an entry is not allowed.
-    """
+    """Return the drive of a configuration file that is kept as text; ParameterError if wrong."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / 'tuned.yaml'
         path.write_text(text, encoding='utf-8')

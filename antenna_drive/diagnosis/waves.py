@@ -28,13 +28,9 @@ def is_there(numbers: np.ndarray[Any, np.dtype[Any]], stem: str) -> bool:
 
 def fastest_wave(record: np.ndarray[Any, np.dtype[Any]]) -> float:
     """Return the cycles per turn of the axis of the fastest wave in a drive's record; 0: none."""
-    cycles = 0.0
-    for motor, part, stem in _OF_MOTORS:
-        numbers = record[motor][part]
-        if is_there(numbers, stem):
-            cycles = max(cycles, float(numbers[f'{stem}_cycles'][0])
-                         * float(record[motor]['gear_ratio'][0]))
-    return cycles
+    return max((float(record[motor][part][f'{stem}_cycles'][0])
+                * float(record[motor]['gear_ratio'][0]) for motor, part, stem in _OF_MOTORS
+                if is_there(record[motor][part], stem)), default=0.0)
 
 
 @dataclass(frozen=True)
@@ -74,11 +70,7 @@ class Wave(Form):
     orders: tuple[float, ...] = ()  # cycles per revolution to look for
 
     def order_of(self, name: str) -> float:
-        """
-        Return the order in the name of a form that `at` has made.
-
-        Raises KeyError: there is none in it.
-        """
+        """Return the order in the name of a form that `at` has made; KeyError if there is none."""
         try:
             return float(name.removesuffix(_CYCLES))
         except ValueError:

@@ -84,11 +84,7 @@ class Window:
 
 
 def windows(recording: FieldRecording, drive: Drive, bias: Bias, most: int) -> list[Window]:
-    """
-    Return the windows of a recording that tell most, at most so many, in the order of time.
-
-    drive, bias : as the sheet says
-    """
+    """Return the windows of a recording that tell most, at most so many, in the order of time."""
     first = first_window(recording)
     if recording.end <= first.end:
         return [first]

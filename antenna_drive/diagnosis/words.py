@@ -49,13 +49,7 @@ def ratio(change: float, word: str = ' percent') -> str:
 
 def words(effects: Iterable[Effect], drive: Drive,
           record: np.ndarray[Any, np.dtype[Any]]) -> dict[str, Words]:
-    """
-    Return what people say of effects, by id.
-
-    effects : of the catalogue
-    drive : the configuration, which knows units
-    record : of the drive in a test, shape (1,), which has the configured numbers
-    """
+    """Return what people say of effects, by id; `record`, shape (1,), is that of a test."""
     units = {path: entry.unit for path, entry, _ in values(drive)}
     return {effect.id: partial(_clause, effect, units, record) for effect in effects}
 
