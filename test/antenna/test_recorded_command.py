@@ -6,8 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from antenna_drive.diagnosis.command_samples import regular_times
-from antenna_drive.diagnosis.recorded_command import RecordedCommand
+from antenna_drive.diagnosis.recorded_command import RecordedCommand, regular_times
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
