@@ -13,6 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, fields, replace
 import math
 from pathlib import Path
+from typing import Any
 
 from antenna_drive.emulator.wiring import MOTORS
 from antenna_drive.parameters.sets import Drive
@@ -31,9 +32,8 @@ BEYOND = 1.2
 _RATE, _HOT, _HOT_S, _TRAVEL_DEG = 0.9, 0.8, 10.0, 10.0
 
 
-def _limit(unit: str, description: str) -> float:
-    found: float = field(metadata={'entry': Entry(unit, 1e-6, 1e12, description)})
-    return found
+def _limit(unit: str, description: str) -> Any:
+    return field(metadata={'entry': Entry(unit, 1e-6, 1e12, description)})
 
 
 @dataclass(frozen=True)
@@ -53,8 +53,7 @@ class DriveLimits:
     def of_drive(cls, drive: Drive) -> DriveLimits:
         """Return the limits that follow from a configuration."""
         armature, motor = drive.motor_1.armature, drive.motor_1.motor
-        ratio = drive.motor_1.gear_ratio
-        torque = 2.0 * motor.current_limit * motor.torque_constant * ratio
+        torque = 2.0 * motor.current_limit * motor.torque_constant * drive.motor_1.gear_ratio
         return cls(
             rate_deg_s=_RATE * math.degrees(drive.greatest_rate),
             # the modes follow the hub later

@@ -7,9 +7,7 @@ The waveform of a test sheet is exact: its jumps are known to the microsecond. A
 known from its samples is a `RecordedCommand`.
 """
 
-from __future__ import annotations
-
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 import math
 from typing import Any, TypeAlias
@@ -73,10 +71,6 @@ class Bias:
     before: float = 0.0
     after: float = 0.0
     at: float = 0.0
-
-    def later(self, begin: float) -> Bias:
-        """Return the source in a time that counts from `begin` [s]."""
-        return replace(self, at=self.at - begin)
 
 
 @dataclass(frozen=True)

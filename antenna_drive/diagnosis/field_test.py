@@ -183,9 +183,9 @@ def window_of(recording: FieldRecording, window: Window, drive: Drive, bias: Bia
     if not math.isinf(window.end):
         name = f'{name} {window.compared:.0f}-{time[-1]:.0f} s'
     test = FieldTest(
-        name, record_of(drive), command, bias.later(window.begin), time - window.begin, measured,
-        slope, sensors, recording.jitter, recording.period, recording.sheet, window.known_start,
-        angle, dict(recording.sheet.labels or ()),
+        name, record_of(drive), command, replace(bias, at=bias.at - window.begin),
+        time - window.begin, measured, slope, sensors, recording.jitter, recording.period,
+        recording.sheet, window.known_start, angle, dict(recording.sheet.labels or ()),
         Excerpt(recording.name, recording.end + recording.later_s, window.begin))
     if not window.known_start:
         off = (measured - test.simulated(_STEP_S))[:, AT['encoder']]

@@ -9,6 +9,7 @@ is never overruled. A note says what was inferred, and by how much the next best
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cache
 
 from antenna_drive.diagnosis.bias_inference import (
@@ -85,7 +86,7 @@ def _misfit_of_currents(recording: FieldRecording, drive: Drive) -> float:
         end = max(end, bias.at)
     time = recording.thinned(first.compared, end + _SIMULATED_S)
     plan = schedule(recording.command_between(first.begin, first.compared, float(time[-1])),
-                    bias.later(first.begin), time - first.begin, Longest(_STEP_S))
+                    replace(bias, at=bias.at - first.begin), time - first.begin, Longest(_STEP_S))
     off = recording.measured(time)[0] - batch.run(record_of(drive), plan)[:, :, 0]
     off = off[:, [AT[name] for name in CURRENTS]]
     if np.isfinite(off).any(axis=0).all():

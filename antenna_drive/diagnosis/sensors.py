@@ -47,11 +47,9 @@ class SensorModel:
     @classmethod
     def of(cls, given: sheets.Sensors | None) -> SensorModel:
         """Take the values of the sheet."""
-        known = {}
-        for number in (number for sensor in SENSORS for number in sensor.numbers):
-            value = getattr(given, number.key, None)
-            known[number.key] = number.usual if value is None else value
-        return cls(known)
+        usual = {number.key: number.usual for sensor in SENSORS for number in sensor.numbers}
+        said = {key: getattr(given, key, None) for key in usual}
+        return cls({key: usual[key] if value is None else value for key, value in said.items()})
 
     def errors(self, reading: Reading, true: FloatArray | float = 0.0) -> Errors:
         """Return what the sensor of a reading does to true values."""
@@ -111,15 +109,12 @@ def spikes(values: FloatArray) -> NDArray[np.bool_]:
     usual = max(1.4826 * float(np.median(off)), float(np.sqrt(np.mean(np.minimum(
         off, np.quantile(off, 0.95)) ** 2))))
     # the ranks around a sample are wanted of few samples only
-    found = np.zeros(values.size, dtype=bool)
-    likely = off > _SCATTERS * usual
-    likely &= off > _AROUND * (neighbours[3] - neighbours[0])
-    if likely.any():
+    found = (off > _SCATTERS * usual) & (off > _AROUND * (neighbours[3] - neighbours[0]))
+    if found.any():
         footprint = np.ones(_NEIGHBOURHOOD + 1, dtype=bool)
         footprint[_NEIGHBOURHOOD // 2] = False
-        around = rank_filter(off, -2, footprint=footprint, mode='reflect')
-        found = likely & (off > _AROUND * around)
-    return found
+        found &= off > _AROUND * rank_filter(off, -2, footprint=footprint, mode='reflect')
+    return np.asarray(found)
 
 
 def slips(rates: FloatArray, noise: float) -> NDArray[np.bool_]:
