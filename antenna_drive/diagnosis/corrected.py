@@ -67,7 +67,9 @@ def correct(drive: Drive, records: Sequence[np.ndarray[Any, np.dtype[Any]]],
             if value != attrgetter(path)(given):
                 why[path] = _EFFECT + effect
     reference = {path: value for path, _, value in values(load())}
+    # by section of the file, with a dot where sections are nested: why, name and value
     lines: dict[str, list[tuple[str, str, Any]]] = {}
+    sections = {place: section for section, place in PLACES.items()}
     unwritten = [owner.get(p.name) or f'{p.name.partition(":")[0]} of each test' for p in missing]
     for path, entry, old in values(given):
         new = written.get(path, old)
@@ -76,8 +78,8 @@ def correct(drive: Drive, records: Sequence[np.ndarray[Any, np.dtype[Any]]],
             unwritten.append(f'{path} beyond {_plain(kept)}')
         if path not in reference or kept != reference[path]:
             reason = AS_GIVEN if new == old else why.get(path, WITHIN)
-            section, name = _place(path)
-            lines.setdefault(section, []).append((reason, name, kept))
+            place, _, name = path.rpartition('.')
+            lines.setdefault(sections.get(place, place), []).append((reason, name, kept))
     return Corrected(_file(lines, hypothesis), recorder, tuple(dict.fromkeys(unwritten)))
 
 
@@ -111,7 +113,8 @@ def _written(drive: Drive, fitted: Sequence[tuple[AntennaParameter, float]],
         elif of_all and isinstance(modifier, ReadingModifier) and modifier.write(run, value):
             continue
         elif item.label is None and isinstance(modifier, RecorderError):
-            recorder.setdefault((modifier.name, item.unit), []).append(value)
+            name = f'{modifier.kind}:{modifier.reading}'.removesuffix(':')
+            recorder.setdefault((name, item.unit), []).append(value)
         else:
             missing.append(item)
     run.write_waves()
@@ -147,13 +150,6 @@ def _allowed(value: Any, entry: Entry) -> Any:
     if isinstance(value, tuple):
         return tuple(min(max(item, entry.low), entry.high) for item in value)
     return min(max(value, entry.low), entry.high) if isinstance(value, float) else value
-
-
-def _place(path: str) -> tuple[str, str]:
-    """Return section of a file, with a dot where sections are nested, and entry of a number."""
-    place, _, name = path.rpartition('.')
-    sections = {place: section for section, place in PLACES.items()}
-    return sections.get(place, place), name
 
 
 def _file(lines: dict[str, list[tuple[str, str, Any]]], hypothesis: Hypothesis) -> str:

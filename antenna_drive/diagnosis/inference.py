@@ -37,7 +37,7 @@ def completed(recordings: Sequence[FieldRecording], drive: Drive,
     """
     Return recordings of one machine with what their sheets lack, as far as they tell it.
 
-    note : called with what was inferred, what is as configured, and what contradicts a sheet
+    `note` is called with what was inferred, is as configured, or contradicts a sheet.
     """
     found = list(recordings)
     if not any(recording.is_planned for recording in recordings):

@@ -83,11 +83,7 @@ class RipplingTachometer:
 
     def read_at(self, time: FloatArray, out: FloatArray, wanted: FloatArray,
                 late: float) -> FloatArray:
-        """
-        Return readings at other times, shape (m,) [rad/s].
-
-        Parameters are those of `late_readings.read_at`, for one channel: `out` has shape (n, 2).
-        """
+        """Return readings at other times, shape (m,) [rad/s]; `out` has shape (n, 2)."""
         motion = np.empty((self.angle.size, 2, 2))
         _motion(self.angle, out, self.numbers, motion)
         later = read_at(time, motion, wanted, np.full(2, late))

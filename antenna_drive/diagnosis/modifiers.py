@@ -186,11 +186,6 @@ class RecorderError(ReadingModifier):
     reading: str = ''
     fields: tuple[str, ...] = ()
 
-    @property
-    def name(self) -> str:
-        """Return its name in a verdict."""
-        return f'{self.kind}:{self.reading}' if self.reading else self.kind
-
     def apply_to_readings(self, readings: SensorReadings, value: float) -> None:
         if self.reading:
             getattr(readings, self.kind)[AT[self.reading]] += value

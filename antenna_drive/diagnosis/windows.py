@@ -76,12 +76,6 @@ class Window:
     end: float = math.inf  # of the window [s]
     known_start: bool = True  # the drive stood still until `begin`
 
-    @property
-    def cost(self) -> float:
-        """Return how much more this window must tell than one without cost."""
-        return (_COST_PER_S * (self.compared - self.begin)
-                + (0.0 if self.known_start else _UNKNOWN_COST))
-
 
 def windows(recording: FieldRecording, drive: Drive, bias: Bias, most: int) -> list[Window]:
     """Return the windows of a recording that tell most, at most so many, in the order of time."""
@@ -94,8 +88,7 @@ def windows(recording: FieldRecording, drive: Drive, bias: Bias, most: int) -> l
         short = replace(first, end=first.compared + 0.5 * _COMPARED_S)
         choices += [[short, window] for window in _later(recording, first, 0.5 * _COMPARED_S)
                     if window.compared >= short.end]
-    worth = [_told(energy, choice) - sum(window.cost for window in choice) for choice in choices]
-    return choices[int(np.argmax(worth))]
+    return max(choices, key=lambda choice: _worth(energy, choice))
 
 
 def first_window(recording: FieldRecording) -> Window:
@@ -136,11 +129,13 @@ def _energy(recording: FieldRecording, drive: Drive, bias: Bias) -> FloatArray:
     return np.cumsum(energy, axis=0)
 
 
-def _told(energy: FloatArray, choice: Sequence[Window]) -> float:
-    """Return how much windows tell of each effect: mean logarithm of the energy."""
-    total = np.zeros(len(_EFFECTS))
+def _worth(energy: FloatArray, choice: Sequence[Window]) -> float:
+    """Return the mean logarithm of the energy of each effect in windows, less what they cost."""
+    total, cost = np.zeros(len(_EFFECTS)), 0.0
     for window in choice:
         first, last = np.clip(np.array([window.compared, window.end]) / _SAMPLE_S, 0,
                               len(energy) - 1).astype(int)
         total += energy[last] - energy[first]
-    return float(np.mean(np.log1p(total)))
+        cost += (_COST_PER_S * (window.compared - window.begin)
+                 + (0.0 if window.known_start else _UNKNOWN_COST))
+    return float(np.mean(np.log1p(total))) - cost
