@@ -130,8 +130,7 @@ def _written(drive: Drive, fitted: Sequence[tuple[AntennaParameter, float]],
         for (name, unit), parts in sorted(recorder.items())), missing
 
 
-def _numbers(drive: Drive, numbers: FloatArray,
-             kind: np.dtype[Any]) -> Iterator[tuple[str, Any]]:
+def _numbers(drive: Drive, numbers: FloatArray, kind: np.dtype[Any]) -> Iterator[tuple[str, Any]]:
     """Yield dotted name and value of every number of a record."""
     extra = numbers[place_of(kind, f'{_AXIS}mode_inertias.{EXTRA_MODE}')] > 0.0
     for path, entry, value in values(drive):

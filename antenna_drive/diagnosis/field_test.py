@@ -10,9 +10,7 @@ from functools import cached_property
 import math
 from typing import Any
 
-from antenna_drive.diagnosis.excitation import (
-    Bias, CommandedRate, Longest, schedule, SheetCommand,
-)
+from antenna_drive.diagnosis.excitation import Bias, CommandedRate, Longest, schedule, SheetCommand
 from antenna_drive.diagnosis.field_recording import FieldRecording, Note
 from antenna_drive.diagnosis.inference import completed
 from antenna_drive.diagnosis.late_readings import dense, lagging, Outputs, parts_of, read_at
@@ -84,8 +82,7 @@ class FieldTest:
     def until(self, end: float) -> FieldTest:
         """Return the first part of the test, of this length [s]."""
         n = int(np.searchsorted(self.time, self.time[0] + end))
-        return replace(self, time=self.time[:n], measured=self.measured[:n],
-                       slope=self.slope[:n])
+        return replace(self, time=self.time[:n], measured=self.measured[:n], slope=self.slope[:n])
 
     def simulated(self, longest_step: float) -> FloatArray:
         """Return the readings of the drive as configured, with steps of at most this [s]."""

@@ -53,8 +53,7 @@ def completed(recordings: Sequence[FieldRecording], drive: Drive,
 def _with_filter_1(recordings: list[FieldRecording], drive: Drive,
                    note: Note) -> list[FieldRecording]:
     """Return recordings whose sheets give Filter 1."""
-    compared = [recording for recording in recordings
-                if recording.readings.keys() & set(CURRENTS)]
+    compared = [recording for recording in recordings if recording.readings.keys() & set(CURRENTS)]
     if not compared:
         return recordings
 

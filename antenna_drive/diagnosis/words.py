@@ -124,8 +124,7 @@ def _amplitude(parts: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     size = math.hypot(*(part['value'] for part in parts))
     half = math.hypot(*(0.5 * (part['ci95'][1] - part['ci95'][0]) * part['value'] / size
                         for part in parts)) if size else 0.0
-    return {'value': size, 'ci95': [max(size - half, 0.0), size + half],
-            'unit': parts[0]['unit']}
+    return {'value': size, 'ci95': [max(size - half, 0.0), size + half], 'unit': parts[0]['unit']}
 
 
 def _configured(modifier: Modifier, units: Mapping[str, str],
