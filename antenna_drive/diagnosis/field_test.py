@@ -165,7 +165,7 @@ def window_of(recording: FieldRecording, window: Window, drive: Drive, bias: Bia
     if isinstance(command, RecordedCommand):
         for begin, end in command.holes + window.begin:
             measured[(time > begin) & (time < end + _FORGOTTEN_S)] = np.nan
-    resting = measured[:np.searchsorted(time, recording.onset)]
+    resting = measured[:np.searchsorted(time, recording.onset)]  # a view
     for tachometer in of(TACHOMETER):
         rates = resting[:, AT[tachometer.name]]
         rates[slips(rates, sensors.errors(tachometer).scatter)] = np.nan

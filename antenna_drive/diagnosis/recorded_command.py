@@ -64,21 +64,20 @@ class RecordedCommand:
     def of(cls, time: FloatArray, value: FloatArray) -> RecordedCommand:
         """Take the samples of a command, shape (n,) [s], [rad/s]."""
         samples = CommandSamples(time, value)
-        found, holes = samples.jumps, samples.holes
-        k, jumps = found.interval, found.time
+        (k, jumps, left, right), holes = samples.jumps, samples.holes
         slack = np.column_stack([np.minimum(time[k] - jumps + _APART_S, 0.0),
                                  np.maximum(time[k + 1] - jumps - _APART_S, 0.0)])
         # two more samples at each jump: the curves on both sides go on to it
-        rise_left, slope_left = _taken_on(found.left, jumps - time[k])
-        rise_right, slope_right = _taken_on(found.right, jumps - time[k + 1])
+        rise_left, slope_left = _taken_on(left, jumps - time[k])
+        rise_right, slope_right = _taken_on(right, jumps - time[k + 1])
         times = np.r_[time, jumps - _APART_S, jumps + _APART_S]
         values = np.r_[value, value[k] + rise_left, value[k + 1] + rise_right]
         order = np.argsort(times, kind='stable')
         # three pieces in the place of an interval with a jump: the middle one is the jump
         slope = np.insert(samples.slopes, np.repeat(k, 2), 0.0, axis=0)
         first = k + 2 * np.arange(k.size)
-        slope[first] = np.column_stack([found.left[:, 0], slope_left])
-        slope[first + 2] = np.column_stack([slope_right, found.right[:, 0]])
+        slope[first] = np.column_stack([left[:, 0], slope_left])
+        slope[first + 2] = np.column_stack([slope_right, right[:, 0]])
         return cls(times[order], values[order], slope, jumps, slack,
                    np.column_stack([time[holes], time[holes + 1]]),
                    samples.uncertainty[holes])._with_corners(samples)
@@ -157,18 +156,6 @@ def _taken_on(derivatives: FloatArray, later: FloatArray) -> tuple[FloatArray, F
 
 
 @dataclass(frozen=True)
-class Jumps:
-    """Where a command jumps."""
-
-    interval: NDArray[np.int64]  # between which samples: number of the first of two, shape (k,)
-    time: FloatArray  # of each jump, shape (k,) [s]
-    # first and second derivative of the command at the samples before and behind each jump, 0
-    # where it is level there, shape (k, 2) [rad/s^2], [rad/s^3]
-    left: FloatArray
-    right: FloatArray
-
-
-@dataclass(frozen=True)
 class CommandSamples:
     """The samples of a command, and what lies in the n - 1 intervals between them."""
 
@@ -206,8 +193,14 @@ class CommandSamples:
         return np.asarray(self.uncertainty > _UNCERTAIN * np.ptp(self.value))
 
     @cached_property
-    def jumps(self) -> Jumps:
-        """Return where the command jumps."""
+    def jumps(self) -> tuple[NDArray[np.int64], FloatArray, FloatArray, FloatArray]:
+        """
+        Return where the command jumps.
+
+        Number of the sample before each jump and its time [s], shape (k,), first and second
+        derivative at the samples before and behind it, 0 where it is level there, shape (k, 2)
+        [rad/s^2], [rad/s^3].
+        """
         change = np.abs(np.diff(self.value))
         usual = np.median(change) + 1e-12
         around = np.maximum(np.r_[change[1:], 0.0], np.r_[0.0, change[:-1]])
@@ -222,7 +215,7 @@ class CommandSamples:
         right = CommandSamples(-self.time[::-1], self.value[::-1])._cut_off()[::-1] * [-1.0, 1.0]
         left[lacks_rows] = right[lacks_rows] = 0.0
         k = np.flatnonzero(large | left.any(axis=1) | right.any(axis=1))
-        return Jumps(k, regular_times(self.time[k], self.time[k + 1]), left[k], right[k])
+        return k, regular_times(self.time[k], self.time[k + 1]), left[k], right[k]
 
     @property
     def _level(self) -> NDArray[np.bool_]:
@@ -264,7 +257,7 @@ class CommandSamples:
         An interval with a jump or a corner is none of them.
         """
         found = self._uncertain
-        found[self.jumps.interval] = False
+        found[self.jumps[0]] = False
         found[self.corners[0]] = False
         return np.flatnonzero(found)
 
@@ -296,7 +289,7 @@ class CommandSamples:
 
         An interval beside a jump or a corner is straight. Those of a jump itself mean nothing.
         """
-        k, left, right = self.jumps.interval, self.jumps.left, self.jumps.right
+        k, _, left, right = self.jumps
         slopes = np.tile(self._slope[:, np.newaxis], 2)
         bend = np.abs(np.r_[0.0, np.diff(self._slope), 0.0])
         # a bend that stands alone is a corner: the samples two further on know nothing of it
