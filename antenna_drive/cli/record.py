@@ -74,7 +74,7 @@ def run(args: argparse.Namespace) -> int:
 def _played(path: Path, sheet: TestSheet | None,
             config: Sequence[str]) -> Mapping[str, Mapping[str, Any]]:
     """Return what a sheet sets on each node."""
-    from antenna_drive.diagnosis.played import parameters_of
+    from antenna_drive.diagnosis.sheet_settings import parameters_of
     from antenna_drive.parameters.loading import load
     assert sheet is not None
     try:

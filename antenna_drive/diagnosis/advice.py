@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which tests of the drive settle which effects, from what anyone knows who has tested drives."""
 
-from __future__ import annotations
-
 # Names of effects, in whichever component, and the test for them; no names: for any of them.
 ADVICE: tuple[tuple[tuple[str, ...], str], ...] = (
     (('gravity_imbalance', 'wind_steady'),

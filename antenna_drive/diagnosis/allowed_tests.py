@@ -1,15 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""
-The tests that the drive may run, as the design of the next test asks for them.
-
-They are waveforms of several families, with their amplitudes and periods.
-"""
-
-from __future__ import annotations
+"""The tests that the drive may run, as the design of the next test asks for them."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -100,20 +94,13 @@ def _levels(draw: _Draw, times: FloatArray, levels: FloatArray) -> Knots:
     return Knots(_numbers(np.repeat(times, 2)[1:-1]), _numbers(np.repeat(levels, 2)))
 
 
-def _steps(draw: _Draw) -> Waveform:
-    hold = draw.between(1.0, draw.duration / 5.0)
+def _random_levels(draw: _Draw, hold: float, shares: Sequence[float]) -> Knots:
+    """Return levels that are held for some time each [s]: shares of an amplitude."""
     times = np.arange(_REST_S, draw.duration - _REST_S - 0.5 * hold, hold)[:30]
-    greatest = draw.amplitude
-    shares = draw.random.choice([-1.0, -0.5, -0.2, -0.05, 0.0, 0.05, 0.2, 0.5, 1.0], times.size)
+    greatest, chosen = draw.amplitude, draw.random.choice(shares, times.size)
     # a test that begins with a long rest wastes time
-    shares[0] = shares[0] or 1.0
-    return _levels(draw, times, greatest * shares)
-
-
-def _prbs(draw: _Draw) -> Waveform:
-    bit = draw.between(draw.duration / 30.0, draw.duration / 10.0)
-    times = np.arange(_REST_S, draw.duration - _REST_S - 0.5 * bit, bit)[:30]
-    return _levels(draw, times, draw.amplitude * draw.random.choice([-1.0, 1.0], times.size))
+    chosen[0] = chosen[0] or 1.0
+    return _levels(draw, times, greatest * chosen)
 
 
 def _slews(draw: _Draw) -> Waveform:
@@ -139,34 +126,32 @@ def _torque(draw: _Draw) -> Waveform:
 FAMILIES: Mapping[str, Callable[[_Draw], Waveform]] = {
     'square': lambda draw: Square(draw.amplitude, draw.period, 0.25),
     'triangle': lambda draw: Triangle(draw.amplitude, draw.period, 0.0),
-    'chirp': _chirp, 'multisine': _multisine, 'steps': _steps, 'prbs': _prbs, 'slews': _slews,
-    'torque': _torque}
+    'chirp': _chirp, 'multisine': _multisine,
+    'steps': lambda draw: _random_levels(
+        draw, draw.between(1.0, draw.duration / 5.0),
+        (-1.0, -0.5, -0.2, -0.05, 0.0, 0.05, 0.2, 0.5, 1.0)),
+    'prbs': lambda draw: _random_levels(
+        draw, draw.between(draw.duration / 30.0, draw.duration / 10.0), (-1.0, 1.0)),
+    'slews': _slews, 'torque': _torque}
 
 
 class AntennaTests(TestSpace):
     """
-    The tests that the drive may run.
+    The tests of a `duration` [s] that the drive may run.
 
-    base : what a further test shares with those that were made; its waveform and start do not
-        count
-    drive : the configuration
-    limits : of the drive
-    duration : of a test [s]
+    `base` is what a further test shares with those that were made.
     """
 
     families = tuple(FAMILIES)
 
     def __init__(self, base: TestSheet, drive: Drive, limits: DriveLimits,
                  duration: float = 30.0) -> None:
-        """Take what all the tests have in common."""
         # the waveform is what is looked for; a proposal is a test from rest
         self._base = replace(base, waveform=None, start='rest')
-        self._drive, self._limits = drive, limits
-        self._duration = duration
-        self.limits = limits.as_data()
+        self._drive, self._limits, self._duration = drive, limits, duration
+        self.limits = asdict(limits)
 
     def draw(self, family: str, random: np.random.Generator) -> TestSheet:
-        """Return the sheet of a test of a family."""
         draw, base = _Draw(self._limits, self._duration, random), self._base
         sheet = replace(base, waveform=FAMILIES[family](draw))
         if random.uniform() < 0.5:
@@ -186,42 +171,37 @@ class AntennaTests(TestSpace):
         if which == 0 and isinstance(test.bias, CircuitBias) and test.bias.bias_pot:
             return _with_pot(test, scale)
         if isinstance(waveform, Knots):
-            assert waveform.rates_deg_s is not None
-            return replace(test, waveform=replace(waveform, rates_deg_s=tuple(
-                _rounded(scale * rate) for rate in waveform.rates_deg_s)))
+            rates = _numbers(scale * np.array(waveform.rates_deg_s))
+            return replace(test, waveform=replace(waveform, rates_deg_s=rates))
         if which == 1 and isinstance(waveform, (Square, Triangle)) and waveform.period_s:
             name = 'period_s'
         return replace(test, waveform=replace(
             waveform, **{name: _rounded(scale * getattr(waveform, name))}))
 
     def machine(self, test: Any) -> AntennaMachine:
-        """Return the drive in one test."""
         return AntennaMachine({'next': planned(test, self._duration, SAMPLE_RATE)}, self._drive,
                               threads=1)
 
     def use(self, machine: Machine, points: Sequence[Point]) -> Mapping[str, float]:
-        """Return the share of each limit that a test uses, the worst of some variants."""
-        shares = [self._limits.use(*_outputs(machine, point, CHANNELS), self._drive)
+        assert isinstance(machine, AntennaMachine)
+        shares = [self._limits.use(*machine.outputs(point, 0, CHANNELS), self._drive)
                   for point in points]
         return {name: max(share[name] for share in shares) for name in shares[0]}
 
     def command(self, test: Any) -> tuple[FloatArray, FloatArray, str]:
-        """Return times, rates and unit of the command of a test."""
         command = SheetCommand(test.waveform)
         time = np.linspace(0.0, self._duration, int(self._duration * _DRAWN_HZ) + 1)
         return time, np.degrees(command(time)), 'deg/s'
 
     def as_data(self, test: Any) -> dict[str, Any]:
-        """Return a test sheet as plain data."""
         return sheet_tree(test)
 
     def files(self, test: Any, path: Path) -> Mapping[Path, str]:
-        """Return a test sheet as YAML."""
         return {path: dump_sheet(test)}
 
     def unread(self, machine: Machine, one: Point, other: Point) -> Mapping[str, float]:
-        """Return by how much two variants differ in what no sensor reads, see `TestSpace`."""
-        first, second = (_outputs(machine, point, tuple(_UNREAD))[1][:, :, 0]
+        assert isinstance(machine, AntennaMachine)
+        first, second = (machine.outputs(point, 0, tuple(_UNREAD))[1][:, :, 0]
                          for point in (one, other))
         size = np.sqrt(np.mean((first - first.mean(axis=0)) ** 2, axis=0))
         off = np.sqrt(np.mean((second - first) ** 2, axis=0)) / np.maximum(size, 1e-12)
@@ -233,9 +213,3 @@ def _with_pot(sheet: TestSheet, scale: float) -> TestSheet:
     bias = sheet.bias
     assert isinstance(bias, CircuitBias) and bias.bias_pot is not None
     return replace(sheet, bias=replace(bias, bias_pot=_rounded(min(bias.bias_pot * scale, 1.0))))
-
-
-def _outputs(machine: Machine, point: Point,
-             channels: tuple[str, ...]) -> tuple[FloatArray, FloatArray]:
-    assert isinstance(machine, AntennaMachine)
-    return machine.outputs(point, 0, channels)

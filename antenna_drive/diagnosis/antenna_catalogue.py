@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The catalogue of the antenna's effects; the orders of its waves are found or named."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 
 from antenna_drive.diagnosis.catalogue import DIGITS_SEEN
@@ -79,15 +77,10 @@ class AntennaCatalogue(Catalogue):
 def likely_orders(form: Wave, experiments: Sequence[Experiment],
                   residuals: Sequence[FloatArray], count: int) -> list[float]:
     """
-    Return the orders that stand out most in the residuals.
+    Return so many orders that stand out most in residuals, shape (n, c) for each test.
 
     The first stands out most from its neighbours, which a misfit without a period does not do.
     The second holds most of the energy. The others follow in turn.
-
-    form : of the wave: the angle it follows, and the channels it shows in
-    experiments : the tests
-    residuals : in the readings' own units, shape (n, c) for each test
-    count : how many
     """
     orders = np.array(form.orders)
     energy = np.zeros(orders.size)

@@ -7,8 +7,6 @@ The voltage tells its source: a constant, one step, or the torque-share circuit,
 are then fed with the recorded currents.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence, Set
 from dataclasses import dataclass, fields, replace
 from functools import cache
@@ -63,8 +61,6 @@ def told(entry: str, misfit: Callable[[str | None], float], given: Set[str | Non
     entry : of a sheet, 'circuit' or 'filter_1'
     misfit : returns how far off the constants of a column are, those configured for None
     given : what the sheets give, which is believed
-    drive : the configuration
-    note : called with what was inferred, or contradicts a sheet
     evidence, undecided : what the misfit is of, and what holds for either, for people
     """
     best, other = sorted(CIRCUITS, key=misfit)
@@ -205,19 +201,12 @@ def _source(time: FloatArray, voltage: FloatArray) -> CircuitBias | FixedBias | 
 
 @dataclass(frozen=True)
 class _Fit:
-    """
-    How well one circuit fits all recordings.
+    """How well one circuit fits all recordings."""
 
-    misfit : mean of what is off [V]
-    scale : what the pot does over what the sheets say of it; 1 if they do not
-    settings : of the pot, for each recording: that of its sheet, or one that fits
-    starts : of the circuit, for each recording
-    """
-
-    misfit: float
-    scale: float
-    settings: tuple[float, ...]
-    starts: tuple[str, ...]
+    misfit: float  # mean of what is off [V]
+    scale: float  # what the pot does over what the sheets say of it; 1 if they do not
+    settings: tuple[float, ...]  # of the pot, by recording: that of its sheet, or one that fits
+    starts: tuple[str, ...]  # of the circuit, by recording
 
     @property
     def pots(self) -> tuple[float, ...]:
@@ -276,9 +265,8 @@ def _fit(recordings: Sequence[FieldRecording], circuit: str | None, drive: Drive
             assert isinstance(bias, CircuitBias)
             tried = {start: _share_voltage(load, share, start)
                      for start in ((bias.start,) if bias.start else STARTS)}
-            misfits = {start: _misfit(voltage, shape, _pot(voltage, shape))
-                       for start, shape in tried.items()}
-            starts.append(min(misfits, key=lambda start: misfits[start]))
+            starts.append(min(tried, key=lambda start: _misfit(
+                voltage, tried[start], _pot(voltage, tried[start]))))
             shapes.append(tried[starts[-1]])
         scale, settings = _pots(voltages, shapes, given)
         misfit = _misfit(np.concatenate(voltages), np.concatenate(
@@ -301,8 +289,7 @@ def _pots(voltages: Sequence[FloatArray], shapes: Sequence[FloatArray],
         chosen = [(voltage, shape if setting is None else setting * shape)
                   for voltage, shape, setting in zip(voltages, shapes, given, strict=True)
                   if (setting is not None) == of_a_sheet]
-        return _pot(np.concatenate([voltage for voltage, _ in chosen]),
-                    np.concatenate([shape for _, shape in chosen])) if chosen else 0.0
+        return _pot(*map(np.concatenate, zip(*chosen, strict=True))) if chosen else 0.0
 
     scale = fitted(True) or 1.0
     own = fitted(False) / scale

@@ -10,16 +10,12 @@ A new effect takes one term in `physics` (with a neutral default in `parameters.
 here with its numbers and what they do (see `modifiers`), and its words in `words.yaml`.
 """
 
-from __future__ import annotations
-
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
-from antenna_drive.diagnosis import gust
 from antenna_drive.diagnosis.modifiers import (
-    add, AntennaParameter, Modifier, RecorderError, Rounding, scale, set_to,
-    WaveShape,
+    add, AntennaParameter, Modifier, RecorderError, Rounding, scale, set_to, WaveShape,
 )
 from antenna_drive.diagnosis.waves import wave
 from antenna_drive.diagnosis.words import row_of
@@ -41,26 +37,16 @@ EXTRA_MODE = 3
 DIGITS_SEEN = 'digits seen'
 
 
-class _Catalogue(dict[str, Effect]):
-    """The entries as they are written down; names of parameters are relative to their effect."""
-
-    def add(self, component: str, name: str, *forms: Form | AntennaParameter,
-            simpler: str = '') -> None:
-        """Add an effect; a number alone is its only form."""
-        key, words = f'{component}.{name}', row_of(component, name)
-        parts = tuple(f'{motor}.{name}' for motor in MOTORS['motors']) * (component == 'motors')
-        self[key] = Effect(key, component, words['cause'], words['look'],
-                           tuple(_prefixed(form, key) for form in forms), parts,
-                           (f'{component}.{simpler}',) * bool(simpler))
-
-
-def _prefixed(form: Form | AntennaParameter, key: str) -> Form:
-    if isinstance(form, AntennaParameter):
-        form = Form('', (form,))
-    if form.is_course:
-        return form
-    return replace(form, parameters=tuple(
-        replace(p, name=f'{key}.{p.name}') for p in form.parameters))
+def _effect(component: str, name: str, *forms: Form | AntennaParameter,
+            simpler: str = '') -> Effect:
+    """Return an effect, whose id its numbers get before their names; one alone is a form."""
+    key, words = f'{component}.{name}', row_of(component, name)
+    whole = [Form('', (form,)) if isinstance(form, AntennaParameter) else form for form in forms]
+    named = (replace(form, parameters=tuple(
+        replace(p, name=f'{key}.{p.name}') for p in form.parameters)) for form in whole)
+    parts = tuple(f'{motor}.{name}' for motor in MOTORS['motors']) * (component == 'motors')
+    return Effect(key, component, words['cause'], words['look'], tuple(named), parts,
+                  (f'{component}.{simpler}',) * bool(simpler))
 
 
 def _number(name: str, unit: str, low: float, high: float, step: float, modifier: Modifier,
@@ -100,133 +86,133 @@ def _stribeck(high: float, step: float, healthy: float, rates: tuple[float, floa
     )) for start in starts)
 
 
-def _rotor_effects(into: _Catalogue, component: str, owners: Sequence[str]) -> None:
+def _rotor_effects(component: str, owners: Sequence[str]) -> Iterator[Effect]:
     at = partial(_fields, owners)
-    into.add(component, 'viscous_friction', _viscous(0.5, 2e-3, 1e-3, owners))
-    into.add(component, 'stribeck_friction', *_stribeck(
+    yield _effect(component, 'viscous_friction', _viscous(0.5, 2e-3, 1e-3, owners))
+    yield _effect(component, 'stribeck_friction', *_stribeck(
         20.0, 0.05, 0.05, (0.02, 40.0), (0.5, 2.0, 8.0), owners), simpler='coulomb_friction')
-    into.add(component, 'coulomb_friction', _number(
+    yield _effect(component, 'coulomb_friction', _number(
         'torque', 'article A', -0.069, 3.0, 0.01, add(*at('coulomb_torque')), healthy=2e-3))
-    into.add(component, 'friction_asymmetry', _number(
+    yield _effect(component, 'friction_asymmetry', _number(
         'share', '1', -8.0, 8.0, 0.05, add(*at('friction_asymmetry')), healthy=0.05))
-    into.add(component, 'load_dependent_friction', _number(
+    yield _effect(component, 'load_dependent_friction', _number(
         'share', '1', 0.0, 0.6, 5e-3, add(*at('load_dependent_friction')), healthy=5e-3))
-    into.add(component, 'torque_ripple', wave(
+    yield _effect(component, 'torque_ripple', wave(
         'N m', 10.0, 0.02, WaveShape('torque_ripple', tuple(owners), owners[0].partition('.')[0]),
         MOTOR_ORDERS, healthy=0.02))
 
 
-def _amplifier_effects(into: _Catalogue, component: str, motors: Sequence[str]) -> None:
+def _amplifier_effects(component: str, motors: Sequence[str]) -> Iterator[Effect]:
     at = partial(_fields, motors)
     torque, back_emf = 'motor.torque_constant', 'armature.back_emf_share'
     # nobody knows whether the amplifier was trimmed to the motor as it is or as it should be
-    into.add(component, 'torque_constant', *(
+    yield _effect(component, 'torque_constant', *(
         Form(form, (_share(-0.6, 0.6, *at(*fields), name=name),)) for form, name, *fields in (
             ('torque and back-EMF', 'change', torque, back_emf),
             ('torque and back-EMF, the limiter trimmed to it', 'trimmed_change', torque,
              'armature.back_emf_constant'),
             ('torque alone', 'torque_change', torque))))
-    into.add(component, 'armature_resistance', Form('of the winding', (_number(
+    yield _effect(component, 'armature_resistance', Form('of the winding', (_number(
         'change', 'ohm', -0.4, 3.0, 4e-3, add(*at('armature.resistance_change'))),
     )), Form('of the winding, the amplifier trimmed to it', (_share(
         -0.8, 3.0, *at('armature.resistance'), name='trimmed_change', healthy=0.02),)))
-    into.add(component, 'amplifier_gain', _share(-0.8, 1.5, *at('amplifier.rate_gain')))
-    into.add(component, 'amplifier_offset', _number(
+    yield _effect(component, 'amplifier_gain', _share(-0.8, 1.5, *at('amplifier.rate_gain')))
+    yield _effect(component, 'amplifier_offset', _number(
         'offset', 'V', -0.5, 0.5, 5e-4, add(*at('amplifier.offset'))))
-    into.add(component, 'amplifier_dead_zone', Form('in front of amplifier 1', (_number(
+    yield _effect(component, 'amplifier_dead_zone', Form('in front of amplifier 1', (_number(
         'half_width', 'V', 0.0, 0.5, 1e-3, add(*at('amplifier.dead_zone')), healthy=1e-3),
     )), Form('crossover of amplifier 2', (_number(
         'crossover', 'article A', 0.0, 2.0, 5e-3, add(*at('amplifier.crossover')),
         healthy=0.01),)))
-    into.add(component, 'current_limit', _share(-0.9, 0.5, *at('motor.current_limit')))
+    yield _effect(component, 'current_limit', _share(-0.9, 0.5, *at('motor.current_limit')))
 
 
-def _gearbox_effects(into: _Catalogue, m: int) -> None:
+def _gearbox_effects(m: int) -> Iterator[Effect]:
     component, gearbox = f'gearbox_{m}', f'motor_{m}.gearbox'
     angle = set_to(f'{gearbox}.hysteresis_angle')
-    into.add(component, 'gap', _share(-0.9, 4.0, f'{gearbox}.half_gap'))
-    into.add(component, 'stiffness', _share(-0.8, 4.0, f'{gearbox}.stiffness'))
-    into.add(component, 'hysteresis', Form('the same at any load', (
+    yield _effect(component, 'gap', _share(-0.9, 4.0, f'{gearbox}.half_gap'))
+    yield _effect(component, 'stiffness', _share(-0.8, 4.0, f'{gearbox}.stiffness'))
+    yield _effect(component, 'hysteresis', Form('the same at any load', (
         _number('torque', 'N m', 0.0, 10.0, 0.02, add(f'{gearbox}.hysteresis'), healthy=0.02),
         _number('angle', 'rad', 2e-3, 0.5, 2e-3, angle, 0.03),
     )), Form('a share of the load', (
         _number('share', '1', 0.0, 0.9, 4e-3, add(f'{gearbox}.hysteresis_share'), healthy=5e-3),
         _number('share_angle', 'rad', 2e-3, 0.5, 2e-3, angle, 0.03))))
-    into.add(component, 'transmission_error', wave(
+    yield _effect(component, 'transmission_error', wave(
         'rad', 0.3, 5e-4, WaveShape('transmission_error', (gearbox,), f'motor_{m}'), MOTOR_ORDERS,
         healthy=5e-4))
 
 
-def _share_effects(into: _Catalogue) -> None:
+def _share_effects() -> Iterator[Effect]:
     component = 'torque_share'
     circuit, filter_1 = f'{component}.circuit', f'{component}.filter_1'
-    into.add(component, 'bias_pot', _share(-0.8, 0.5, f'{circuit}.bias_pot'))
-    into.add(component, 'fade_out_voltage', _share(-0.6, 0.6, f'{circuit}.fade_out_voltage'))
+    yield _effect(component, 'bias_pot', _share(-0.8, 0.5, f'{circuit}.bias_pot'))
+    yield _effect(component, 'fade_out_voltage', _share(-0.6, 0.6, f'{circuit}.fade_out_voltage'))
     speed_of_2, speed_of_3 = (f'{circuit}.s_2', f'{circuit}.k_2'), (f'{circuit}.k_3',)
-    into.add(component, 'share_filter', *(
+    yield _effect(component, 'share_filter', *(
         Form(form, (_share(-0.8, 3.0, *fields, name=name),)) for form, name, fields in (
             ('transfer function 3', 'load_rate_change', speed_of_3),
             ('transfer functions 2 and 4', 'share_rate_change', speed_of_2),
             ('all transfer functions', 'rate_change', (*speed_of_2, *speed_of_3)))))
-    into.add(component, 'filter_1_gain', _share(-0.8, 2.0, f'{filter_1}.gain'))
-    into.add(component, 'filter_1_pole', _share(-0.8, 3.0, f'{filter_1}.pole'))
+    yield _effect(component, 'filter_1_gain', _share(-0.8, 2.0, f'{filter_1}.gain'))
+    yield _effect(component, 'filter_1_pole', _share(-0.8, 3.0, f'{filter_1}.pole'))
 
 
-def _axis_effects(into: _Catalogue) -> None:
+def _axis_effects() -> Iterator[Effect]:
     component, axis = 'axis', 'plant.axis'
-    into.add(component, 'coulomb_friction', _share(-0.9, 3.0, f'{axis}.coulomb_torque'))
-    into.add(component, 'viscous_friction', _viscous(1e9, 1e5, 2e5, [axis]))
-    into.add(component, 'stribeck_friction', *_stribeck(
+    yield _effect(component, 'coulomb_friction', _share(-0.9, 3.0, f'{axis}.coulomb_torque'))
+    yield _effect(component, 'viscous_friction', _viscous(1e9, 1e5, 2e5, [axis]))
+    yield _effect(component, 'stribeck_friction', *_stribeck(
         6e5, 1e3, 3e3, (2e-6, 3e-3), (4e-5, 2e-4, 8e-4), [axis]), simpler='coulomb_friction')
-    into.add(component, 'position_dependent_friction', wave(
+    yield _effect(component, 'position_dependent_friction', wave(
         '1', 0.9, 5e-3, WaveShape('friction_wave', (axis,), 'axis'), _RAIL_ORDERS, healthy=0.01))
     for name, field in (('gravity_imbalance', 'gravity_torque'),
                         ('wind_steady', 'steady_wind_torque')):
-        into.add(component, name, _number(
+        yield _effect(component, name, _number(
             'torque', 'N m', -1e6, 1e6, 500.0, add(f'{axis}.{field}'), healthy=1e3))
-    into.add(component, 'inertia', _share(-0.6, 2.0, f'{axis}.inertia_hub'))
+    yield _effect(component, 'inertia', _share(-0.6, 2.0, f'{axis}.inertia_hub'))
     for name, field, number, *range_and_step in (
             ('mode_frequency', 'mode_frequencies', 'change', -0.5, 0.8, 3e-3),
             ('mode_damping', 'mode_damping_ratios', 'factor', -0.95, 30.0, 0.1)):
         low, high, step = range_and_step
         fields = [f'{axis}.{field}.{j}' for j in range(3)]
-        into.add(component, name, *(
+        yield _effect(component, name, *(
             Form(f'mode {j}', (_share(low, high, path, name=f'{number}_{j}', step=step),))
             for j, path in enumerate(fields, 1)),
             Form('all modes', (_share(low, high, *fields, name=number, step=step),)))
     inertia, frequency, damping = (set_to(f'{axis}.{field}.{EXTRA_MODE}') for field in (
         'mode_inertias', 'mode_frequencies', 'mode_damping_ratios'))
-    into.add(component, 'extra_mode', *(Form(f'{hertz:.2g} Hz', (
+    yield _effect(component, 'extra_mode', *(Form(f'{hertz:.2g} Hz', (
         _number('inertia', 'kg m^2', 0.0, 8e6, 2e4, inertia, healthy=2e4),
         _number('frequency', 'Hz', 0.85 * hertz, 1.18 * hertz, 0.005 * hertz, frequency, hertz),
         _number('damping', '1', 0.0, 0.2, 2e-3, damping, 0.03))) for hertz in EXTRA_MODES))
-    into.add(component, 'bull_gear_backlash', _number(
+    yield _effect(component, 'bull_gear_backlash', _number(
         'half_gap', 'rad', -0.1, 0.6, 1e-3, add(*_fields(MOTORS['motors'], 'gearbox.half_gap')),
         healthy=3e-3))
 
 
-def _sensor_effects(into: _Catalogue, encoder_digit: float) -> None:
+def _sensor_effects(encoder_digit: float) -> Iterator[Effect]:
     for m in (1, 2):
         tach, current, motor = f'tach_{m}', f'current_{m}', f'motor_{m}'
         tachometer = f'{motor}.tachometer'
-        into.add(tach, 'gain', _number(
+        yield _effect(tach, 'gain', _number(
             'change', '1', -0.3, 0.3, 5e-4, add(f'{tachometer}.gain'), healthy=3e-3))
-        into.add(tach, 'offset', _number(
+        yield _effect(tach, 'offset', _number(
             'offset', 'rad/s', -5.0, 5.0, 0.02, add(f'{tachometer}.offset')))
-        into.add(tach, 'ripple', wave('1', 0.3, 2e-4, WaveShape('ripple', (tachometer,), motor),
-                                      MOTOR_ORDERS, healthy=1e-3))
-        into.add(current, 'gain', _recorder_gain(current))
-        into.add(current, 'offset', _number(
+        yield _effect(tach, 'ripple', wave(
+            '1', 0.3, 2e-4, WaveShape('ripple', (tachometer,), motor), MOTOR_ORDERS, healthy=1e-3))
+        yield _effect(current, 'gain', _recorder_gain(current))
+        yield _effect(current, 'offset', _number(
             'offset', 'article A', -1.0, 1.0, 1e-3,
             RecorderError('zero', current, (f'{motor}.ammeter.offset',)), healthy=0.02))
-    into.add('encoder', 'quantisation', _quantisation(encoder_digit))
-    into.add('encoder', 'cyclic_error', wave(
+    yield _effect('encoder', 'quantisation', _quantisation(encoder_digit))
+    yield _effect('encoder', 'cyclic_error', wave(
         'rad', 1e-3, 1e-6, WaveShape('cyclic_error', ('plant.encoder',), 'axis'), _ENCODER_ORDERS,
         on_readings=True, healthy=2e-6), simpler='offset')
-    into.add('encoder', 'offset', _number(
+    yield _effect('encoder', 'offset', _number(
         'offset', 'rad', -0.1, 0.1, 1e-6,
         RecorderError('zero', 'encoder', ('plant.encoder.offset',)), healthy=2e-5))
-    into.add('bias_voltage', 'gain', _recorder_gain('bias_voltage'))
+    yield _effect('bias_voltage', 'gain', _recorder_gain('bias_voltage'))
 
 
 def _recorder_gain(reading: str) -> AntennaParameter:
@@ -247,28 +233,18 @@ def _quantisation(digit: float) -> Form | AntennaParameter:
     return Form(DIGITS_SEEN, (_number('step', 'rad', 0.0, digit, digit, digits), turn))
 
 
-def catalogue(durations_s: Sequence[float] = (), encoder_digit: float = 0.0,
-              wind: float = 0.0) -> dict[str, Effect]:
-    """
-    Return the catalogue of the drive, by id.
-
-    durations_s : of the tests, in each of which a gust has a course of its own [s]
-    encoder_digit : digit that the encoder's readings tell [rad]; 0 if they tell none
-    wind : rms torque of the wind of every day [N m]
-    """
-    into = _Catalogue()
+def catalogue(encoder_digit: float = 0.0) -> dict[str, Effect]:
+    """Return the catalogue, by id; the encoder's readings tell a digit [rad], or 0 for none."""
+    found: list[Effect] = []
     for component, motors in MOTORS.items():
-        _rotor_effects(into, component, _fields(motors, 'motor'))
-        _amplifier_effects(into, component, motors)
+        found += _rotor_effects(component, _fields(motors, 'motor'))
+        found += _amplifier_effects(component, motors)
     for m in (1, 2):
-        _gearbox_effects(into, m)
-    _share_effects(into)
-    _axis_effects(into)
-    _sensor_effects(into, encoder_digit)
-    into.add('axis', 'wind_gust', gust.gust_form(durations_s, wind))
-    into.add('loop', 'delay', Form('of the command', (_number(
-        'time', 's', 0.0, 0.2, 5e-4, add('test_signal.delay'), healthy=5e-4),
-    )), Form('of the rate error', (_number(
-        'error_time', 's', 0.0, 0.05, 2e-4,
-        add(*_fields(MOTORS['motors'], 'amplifier.delay')), healthy=2e-4),)))
-    return dict(into)
+        found += _gearbox_effects(m)
+    found += (*_share_effects(), *_axis_effects(), *_sensor_effects(encoder_digit))
+    delay = _number('time', 's', 0.0, 0.2, 5e-4, add('test_signal.delay'), healthy=5e-4)
+    later = _number('error_time', 's', 0.0, 0.05, 2e-4,
+                    add(*_fields(MOTORS['motors'], 'amplifier.delay')), healthy=2e-4)
+    found.append(_effect('loop', 'delay', Form('of the command', (delay,)),
+                         Form('of the rate error', (later,))))
+    return {effect.id: effect for effect in found}

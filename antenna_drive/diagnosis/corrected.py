@@ -7,10 +7,9 @@ What a number of the configuration stands for is written there. The recorder's o
 part of the machine: they are returned beside it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import Any
 
 from antenna_drive.diagnosis.catalogue import EXTRA_MODE
@@ -18,8 +17,7 @@ from antenna_drive.diagnosis.excitation import Bias
 from antenna_drive.diagnosis.modifiers import (
     AntennaParameter, ReadingModifier, RecorderError, RunModifier, RunSetup, SCALE,
 )
-from antenna_drive.diagnosis.sheet_settings import value_of
-from antenna_drive.parameters.loading import load
+from antenna_drive.parameters.loading import load, PLACES
 from antenna_drive.parameters.records import place_of, record_of
 from antenna_drive.parameters.sets import changed, Drive, values
 from antenna_drive.yaml_text import dump_yaml
@@ -34,15 +32,10 @@ _POT = f'{_SHARE}.bias_pot'
 # three scale it as the pot does.
 _LIKE_THE_POT = tuple(f'{_SHARE}.{name}' for name in ('k_2', 'saturation_low', 'saturation_high'))
 # What a test sets, and no machine is.
-_OF_A_TEST = (_POT, f'{_SHARE}.fixed_voltage', 'plant.axis.start_elevation',
+_OF_A_TEST = (f'{_SHARE}.fixed_voltage', 'plant.axis.start_elevation',
               'motor_1.start_in_gap', 'motor_2.start_in_gap')
+# Its lists have a number for each mode.
 _AXIS = 'plant.axis.'
-_OF_MODES = tuple(f'{_AXIS}{name}' for name in (
-    'mode_inertias', 'mode_frequencies', 'mode_damping_ratios', 'pointing_elevation',
-    'pointing_cross_elevation'))
-# Where a number stands in a file, by how its dotted name begins.
-_SECTIONS = {f'{_SHARE}.': 'torque_share', 'torque_share.filter_1.': 'filter_1',
-             _AXIS: 'axis', 'plant.encoder.': 'encoder'}
 AS_GIVEN = 'as configured, or as the test sheets say'
 WITHIN = 'within tolerance, as fitted'
 _EFFECT = 'fitted effect '
@@ -50,43 +43,33 @@ _EFFECT = 'fitted effect '
 
 @dataclass(frozen=True)
 class Corrected:
-    """
-    A corrected configuration.
+    """A corrected configuration."""
 
-    text : the file
-    recorder : errors of the recorder: name, value, unit
-    unwritten : what the file cannot hold, for people
-    """
-
-    text: str
-    recorder: tuple[dict[str, Any], ...]
-    unwritten: tuple[str, ...]
+    text: str  # the file
+    recorder: tuple[dict[str, Any], ...]  # errors of the recorder: name, value, unit
+    unwritten: tuple[str, ...]  # what the file cannot hold, for people
 
 
 def correct(drive: Drive, records: Sequence[np.ndarray[Any, np.dtype[Any]]],
             hypothesis: Hypothesis) -> Corrected:
-    """
-    Return the configuration with a hypothesis in it.
-
-    drive : the configuration that was diagnosed
-    records : of the drive in each test
-    hypothesis : as fitted to the tests
-    """
+    """Return the diagnosed configuration, of `records` in the tests, with a hypothesis in it."""
     given = _as_all_tests_have_it(drive, records)
     point = hypothesis.state.point()
     owner = {p.name: effect for effect, form in hypothesis.items for p in form.parameters}
     fitted = [(p, point[p.name]) for p in hypothesis.state.parameters
               if isinstance(p, AntennaParameter) and point[p.name] != 0.0]
     written, recorder, missing = _written(given, fitted)
-    why = dict.fromkeys((path for path, _, _ in values(given)), WITHIN)
+    why: dict[str, str] = {}
     for effect in hypothesis.effects:
         alone, _, _ = _written(given, [
             (p, value) for p, value in fitted if owner.get(p.name) == effect])
         for path, value in alone.items():
-            if value != value_of(given, path):
+            if value != attrgetter(path)(given):
                 why[path] = _EFFECT + effect
     reference = {path: value for path, _, value in values(load())}
+    # by section of the file, with a dot where sections are nested: why, name and value
     lines: dict[str, list[tuple[str, str, Any]]] = {}
+    sections = {place: section for section, place in PLACES.items()}
     unwritten = [owner.get(p.name) or f'{p.name.partition(":")[0]} of each test' for p in missing]
     for path, entry, old in values(given):
         new = written.get(path, old)
@@ -94,9 +77,9 @@ def correct(drive: Drive, records: Sequence[np.ndarray[Any, np.dtype[Any]]],
         if kept != new:
             unwritten.append(f'{path} beyond {_plain(kept)}')
         if path not in reference or kept != reference[path]:
-            reason = AS_GIVEN if new == old else why[path]
-            section, name = _place(path)
-            lines.setdefault(section, []).append((reason, name, kept))
+            reason = AS_GIVEN if new == old else why.get(path, WITHIN)
+            place, _, name = path.rpartition('.')
+            lines.setdefault(sections.get(place, place), []).append((reason, name, kept))
     return Corrected(_file(lines, hypothesis), recorder, tuple(dict.fromkeys(unwritten)))
 
 
@@ -105,8 +88,8 @@ def _as_all_tests_have_it(drive: Drive,
     """Return the drive with what all tests agree on: the circuits and settings of their sheets."""
     kind = records[0].dtype
     changes = {}
-    for path, entry, value in values(drive):
-        if isinstance(value, float) and entry.lengths is None and path not in _OF_A_TEST[1:]:
+    for path, _, value in values(drive):
+        if isinstance(value, float) and path not in _OF_A_TEST:
             there = {float(record.view(np.float64)[place_of(kind, path)]) for record in records}
             if len(there) == 1:
                 changes[path] = there.pop()
@@ -130,12 +113,13 @@ def _written(drive: Drive, fitted: Sequence[tuple[AntennaParameter, float]],
         elif of_all and isinstance(modifier, ReadingModifier) and modifier.write(run, value):
             continue
         elif item.label is None and isinstance(modifier, RecorderError):
-            recorder.setdefault((modifier.name, item.unit), []).append(value)
+            name = f'{modifier.kind}:{modifier.reading}'.removesuffix(':')
+            recorder.setdefault((name, item.unit), []).append(value)
         else:
             missing.append(item)
     run.write_waves()
     pot = place_of(kind, _POT)
-    before = float(value_of(drive, _POT))
+    before = drive.torque_share.circuit.bias_pot
     if run.numbers[pot] != before:
         # the pot is set for each test, and its sheet says how
         for path in _LIKE_THE_POT:
@@ -146,16 +130,14 @@ def _written(drive: Drive, fitted: Sequence[tuple[AntennaParameter, float]],
         for (name, unit), parts in sorted(recorder.items())), missing
 
 
-def _numbers(drive: Drive, numbers: FloatArray,
-             kind: np.dtype[Any]) -> Iterator[tuple[str, Any]]:
+def _numbers(drive: Drive, numbers: FloatArray, kind: np.dtype[Any]) -> Iterator[tuple[str, Any]]:
     """Yield dotted name and value of every number of a record."""
-    modes = len(drive.plant.axis.mode_inertias)
     extra = numbers[place_of(kind, f'{_AXIS}mode_inertias.{EXTRA_MODE}')] > 0.0
     for path, entry, value in values(drive):
         if isinstance(value, tuple):
             count = len(value)
-            if extra and path in _OF_MODES:
-                count = max(modes, EXTRA_MODE + 1)
+            if extra and path.startswith(_AXIS):
+                count = max(count, EXTRA_MODE + 1)
             first = place_of(kind, f'{path}.0')
             yield path, tuple(numbers[first:first + count].tolist())
         elif entry.choices is None and not entry.whole:
@@ -167,15 +149,6 @@ def _allowed(value: Any, entry: Entry) -> Any:
     if isinstance(value, tuple):
         return tuple(min(max(item, entry.low), entry.high) for item in value)
     return min(max(value, entry.low), entry.high) if isinstance(value, float) else value
-
-
-def _place(path: str) -> tuple[str, str]:
-    """Return section, with a dot in it where sections are nested, and entry of a number."""
-    for beginning, section in _SECTIONS.items():
-        if path.startswith(beginning):
-            return section, path[len(beginning):]
-    section, _, name = path.rpartition('.')
-    return section, name
 
 
 def _file(lines: dict[str, list[tuple[str, str, Any]]], hypothesis: Hypothesis) -> str:
@@ -190,10 +163,9 @@ def _file(lines: dict[str, list[tuple[str, str, Any]]], hypothesis: Hypothesis) 
         if outer != opened:
             text += ['', f'{outer}:']
             opened = outer
-        indent = '  '
         if inner:
             text.append(f'  {inner}:')
-            indent = '    '
+        indent = '    ' if inner else '  '
         entries = lines[section]
         for reason in dict.fromkeys(reason for reason, _, _ in entries):
             text.append(f'{indent}# {reason}')

@@ -13,8 +13,6 @@ Examples
 
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 from antenna_drive.diagnosis.corrected import correct, Corrected
@@ -40,13 +38,9 @@ def diagnose_recordings(recordings: Mapping[str, Recording], drive: Drive,
     Say where a real drive and its model part, which effect is behind it, and how far it goes.
 
     recordings : of one machine, by name, with their test sheets
-    drive : the configuration of the model
-    progress : called with the share that is done, 0 to 1, and what is being done
     threads : how many simulations at once
-    settings : thresholds
     without : effects that the catalogue shall lack
-    limits : for some signals, the remainder beyond noise from which it matters
-    earlier : answers of a verdict on some of the recordings, see `diagnosis.diagnose`
+    progress, settings, limits, earlier : see `simgap.verdict.diagnosis.diagnose`
 
     Raises UserError: a recording cannot be used; the message says which and why.
     """

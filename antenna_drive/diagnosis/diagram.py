@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The picture of the drive: from the rate command on the left to the encoder on the right."""
 
-from __future__ import annotations
-
 from antenna_drive.readings import NAMED
 from simgap.machine.diagram import Diagram, DiagramBlock
 

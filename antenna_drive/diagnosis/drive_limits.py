@@ -10,10 +10,10 @@ only by what `BEYOND` says. What it may not do is stay there, see `hot_s`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields, replace
 import math
 from pathlib import Path
+from typing import Any
 
 from antenna_drive.emulator.wiring import MOTORS
 from antenna_drive.parameters.sets import Drive
@@ -32,9 +32,8 @@ BEYOND = 1.2
 _RATE, _HOT, _HOT_S, _TRAVEL_DEG = 0.9, 0.8, 10.0, 10.0
 
 
-def _limit(unit: str, description: str) -> float:
-    found: float = field(metadata={'entry': Entry(unit, 1e-6, 1e12, description)})
-    return found
+def _limit(unit: str, description: str) -> Any:
+    return field(metadata={'entry': Entry(unit, 1e-6, 1e12, description)})
 
 
 @dataclass(frozen=True)
@@ -54,8 +53,7 @@ class DriveLimits:
     def of_drive(cls, drive: Drive) -> DriveLimits:
         """Return the limits that follow from a configuration."""
         armature, motor = drive.motor_1.armature, drive.motor_1.motor
-        ratio = drive.motor_1.gear_ratio
-        torque = 2.0 * motor.current_limit * motor.torque_constant * ratio
+        torque = 2.0 * motor.current_limit * motor.torque_constant * drive.motor_1.gear_ratio
         return cls(
             rate_deg_s=_RATE * math.degrees(drive.greatest_rate),
             # the modes follow the hub later
@@ -64,44 +62,32 @@ class DriveLimits:
             voltage_V=BEYOND * armature.voltage_limit, axis_torque_N_m=BEYOND * torque,
             hot_current_A=_HOT * motor.current_limit, hot_s=_HOT_S)
 
-    def as_data(self) -> dict[str, float]:
-        """Return the limits by name."""
-        return asdict(self)
-
     def use(self, time: FloatArray, out: FloatArray, drive: Drive) -> dict[str, float]:
         """
         Return the share of each limit that a simulated test uses, 1 at the limit.
 
         time : shape (n,) [s]
         out : values and slopes of `CHANNELS`, shape (n, 8, 2)
-        drive : the configuration
         """
-        value, slope = (dict(zip(CHANNELS, out[:, :, k].T, strict=True)) for k in (0, 1))
-        armature, ratio = drive.motor_1.armature, drive.motor_1.gear_ratio
-        current = _of_motors(value, 'current')
+        armature = drive.motor_1.armature
+        (rate, angle), (acceleration, _) = out[:, :2, 0].T, out[:, :2, 1].T
+        current, torque, tach = np.split(out[:, 2:], 3, axis=1)
         voltage = (armature.physical_amperes_per_article_ampere * (
-            armature.inductance * _of_motors(slope, 'current') + armature.resistance * current)
-            + armature.back_emf_constant * _of_motors(value, 'tach_rate'))
-        angle = value['plant/axis_angle']
-        hot = np.gradient(time) @ (np.abs(current) > self.hot_current_A)
+            armature.inductance * current[:, :, 1] + armature.resistance * current[:, :, 0])
+            + armature.back_emf_constant * tach[:, :, 0])
+        hot = np.gradient(time) @ (np.abs(current[:, :, 0]) > self.hot_current_A)
         reached = {
-            'rate_deg_s': math.degrees(_greatest(value['plant/axis_rate'])),
-            'acceleration_deg_s2': math.degrees(_greatest(slope['plant/axis_rate'])),
+            'rate_deg_s': math.degrees(_greatest(rate)),
+            'acceleration_deg_s2': math.degrees(_greatest(acceleration)),
             'travel_deg': math.degrees(_greatest(angle - angle.min())),
-            'current_A': _greatest(current), 'voltage_V': _greatest(voltage),
-            'axis_torque_N_m': ratio * _greatest(
-                _of_motors(value, 'gear_torque').sum(axis=1)),
+            'current_A': _greatest(current[:, :, 0]), 'voltage_V': _greatest(voltage),
+            'axis_torque_N_m': drive.motor_1.gear_ratio * _greatest(torque[:, :, 0].sum(axis=1)),
             'hot_s': _greatest(hot)}
         return {name: amount / getattr(self, name) for name, amount in reached.items()}
 
 
 def read_limits(path: Path, drive: Drive) -> DriveLimits:
-    """
-    Read limits from a file; what it does not give follows from the configuration.
-
-    Raises ParameterError: the file cannot be read or an entry is not allowed; the message names
-    both.
-    """
+    """Read limits, what a file lacks follows from the configuration; ParameterError if wrong."""
     tree = read_yaml(path)
     known = {item.name: item.metadata['entry'] for item in fields(DriveLimits)}
     try:
@@ -110,11 +96,6 @@ def read_limits(path: Path, drive: Drive) -> DriveLimits:
             name: known[name].check(name, value) for name, value in given.items()})
     except ParameterError as error:
         raise ParameterError(f'{path}: {error}') from None
-
-
-def _of_motors(values: Mapping[str, FloatArray], signal: str) -> FloatArray:
-    """Return a signal of both motors, shape (n, 2)."""
-    return np.stack([values[f'{motor}/{signal}'] for motor in MOTORS], axis=1)
 
 
 def _greatest(values: FloatArray) -> float:

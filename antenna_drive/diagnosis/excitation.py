@@ -7,13 +7,12 @@ The waveform of a test sheet is exact: its jumps are known to the microsecond. A
 known from its samples is a `RecordedCommand`.
 """
 
-from __future__ import annotations
-
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 import math
-from typing import Any, Protocol
+from typing import Any, TypeAlias
 
+from antenna_drive.diagnosis.recorded_command import RecordedCommand
 from antenna_drive.emulator import batch
 from antenna_drive.parameters.records import record_of
 from antenna_drive.physics import signal_generator
@@ -26,16 +25,6 @@ from simgap.machine.contract import FloatArray
 _PLACES = np.array([0.1, 0.5, 0.9])
 _NO_BITS = np.ones(1)   # no test sheet has a pseudo-random sequence
 _PARABOLA = np.linalg.inv(np.vander(_PLACES, 3, increasing=True))
-
-
-class CommandedRate(Protocol):
-    """An axis rate command over time."""
-
-    def __call__(self, time: FloatArray) -> FloatArray:
-        """Return the rate command [rad/s] at these times [s]."""
-
-    def knots(self, end: float) -> FloatArray:
-        """Return the times up to `end` at which the command or its slope jumps [s]."""
 
 
 @dataclass(frozen=True)
@@ -62,14 +51,17 @@ class SheetCommand:
             first = 0.0 if isinstance(w, sheets.Square) else 0.25
             cycles = np.arange(np.floor(phase) - 1.0, end / period + phase + 1.0, 0.5) + first
             times = (cycles - phase) * period
-            return times[(times > 0.0) & (times < end)]
-        if isinstance(w, sheets.Knots):
+        elif isinstance(w, sheets.Knots):
             times = np.unique(w.times_s or ())
-            return times[(times > 0.0) & (times < end)]
-        edges = [w.start_s or 0.0]
-        if isinstance(w, sheets.Chirp):
-            edges.append(edges[0] + (w.duration_s or 0.0))
-        return np.array([edge for edge in edges if 0.0 < edge < end])
+        else:
+            start = w.start_s or 0.0
+            sweep = (w.duration_s or 0.0) if isinstance(w, sheets.Chirp) else 0.0
+            times = np.unique([start, start + sweep])
+        return times[(times > 0.0) & (times < end)]
+
+
+# An axis rate command over time.
+CommandedRate: TypeAlias = SheetCommand | RecordedCommand
 
 
 @dataclass(frozen=True)
@@ -80,31 +72,15 @@ class Bias:
     after: float = 0.0
     at: float = 0.0
 
-    def later(self, begin: float) -> Bias:
-        """Return the source in a time that counts from `begin` [s]."""
-        return replace(self, at=self.at - begin)
-
 
 @dataclass(frozen=True)
 class Longest:
-    """
-    How long a step of the integration may be.
+    """How long a step of the integration may be."""
 
-    usual : at most so long [s]
-    shortest : even where a wave asks for less [s]
-    wave : angle by which a wave may turn in a step [rad]
-    cycles : of the fastest wave per turn of the axis, 0 for none
-    """
-
-    usual: float
-    shortest: float = 0.0
-    wave: float = math.inf
-    cycles: float = 0.0
-
-    def at(self, rate: FloatArray) -> FloatArray:
-        """Return the longest step where the axis turns at these rates [rad/s], as an array."""
-        asked = self.wave / np.maximum(self.cycles * np.abs(rate), 1e-9)
-        return np.asarray(np.minimum(self.usual, np.maximum(self.shortest, asked)))
+    usual: float  # at most so long [s]
+    shortest: float = 0.0  # even where a wave asks for less [s]
+    wave: float = math.inf  # angle by which a wave may turn in a step [rad]
+    cycles: float = 0.0  # of the fastest wave per turn of the axis, 0 for none
 
 
 def schedule(command: CommandedRate, bias: Bias, samples: FloatArray, longest: Longest,
@@ -112,24 +88,18 @@ def schedule(command: CommandedRate, bias: Bias, samples: FloatArray, longest: L
     """
     Plan the integration of a test: no step reaches across a sample, a jump, or `longest`.
 
-    command, bias : what the test does
     samples : when the sensors are read, increasing, none before zero, shape (n,) [s]
-    longest : step, where the axis turns as commanded
     delay : by which the command comes late [s]
     """
     end = float(samples[-1])
-    jumps = command.knots(end) + delay
-    if delay > 0.0:
-        jumps = np.r_[delay, jumps]
-    if 0.0 < bias.at < end:
-        jumps = np.r_[jumps, bias.at]
-    jumps = jumps[(jumps > 0.0) & (jumps < end)]
-    knots = np.unique(np.r_[0.0, samples, jumps])
+    jumps = np.r_[command.knots(end) + delay, delay, bias.at]
+    knots = np.unique(np.r_[0.0, samples, jumps[(jumps > 0.0) & (jumps < end)]])
     # a jump on a sample needs no step of its own
-    keep = np.r_[True, np.diff(knots) > 1e-9]
-    knots = knots[keep]
+    knots = knots[np.r_[True, np.diff(knots) > 1e-9]]
     rate = command(0.5 * (knots[:-1] + knots[1:]) - delay)
-    pieces = np.maximum(np.ceil(np.diff(knots) / longest.at(rate) - 1e-6).astype(int), 1)
+    asked = longest.wave / np.maximum(longest.cycles * np.abs(rate), 1e-9)
+    allowed = np.minimum(longest.usual, np.maximum(longest.shortest, asked))
+    pieces = np.maximum(np.ceil(np.diff(knots) / allowed - 1e-6).astype(int), 1)
     first = np.repeat(knots[:-1], pieces)
     length = np.repeat(np.diff(knots) / pieces, pieces)
     number = np.arange(first.size) - np.repeat(np.r_[0, np.cumsum(pieces)[:-1]], pieces)

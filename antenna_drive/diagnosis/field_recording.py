@@ -45,36 +45,21 @@ Note = Callable[[str], None]
 
 @dataclass(frozen=True)
 class FieldRecording:
-    """
-    A recording as all its windows share it; time counts from the start of the test.
+    """A recording as all its windows share it; time counts from the start of the test."""
 
-    name : for people
-    sheet : what the tester knows
-    command : axis rate command
-    rates : its samples
-    readings : those that were recorded, by their short names, without spikes
-    time : of the samples of the reading with most of them, spikes included, shape (n,) [s]
-    is_planned : the readings are not measured
-    later_s : how much longer the recording is than what was looked at [s]
-    """
-
-    name: str
-    sheet: sheets.TestSheet
-    command: SheetCommand | RecordedCommand
-    rates: Channel
-    readings: dict[str, Channel]
-    time: FloatArray
-    is_planned: bool
-    later_s: float = 0.0
+    name: str  # for people
+    sheet: sheets.TestSheet  # what the tester knows
+    command: CommandedRate  # axis rate command
+    rates: Channel  # its samples
+    readings: dict[str, Channel]  # those that were recorded, by short names, without spikes
+    time: FloatArray  # of the reading with most samples, spikes included, shape (n,) [s]
+    is_planned: bool  # the readings are not measured
+    later_s: float = 0.0  # how much longer the recording is than what was looked at [s]
 
     @classmethod
     def of(cls, name: str, recording: Recording, note: Note) -> FieldRecording:
         """
-        Check and clean a recording with its test sheet.
-
-        name : for people
-        recording : with its test sheet
-        note : called with what was inferred or is missing
+        Check and clean a recording; `note` is called with what was inferred or is missing.
 
         Raises UserError: the rate command is missing, or there is no reading to compare, or nearly
         none.
@@ -112,6 +97,24 @@ class FieldRecording:
         return float(np.median(np.diff(self.rates.time_s)))
 
     @property
+    def jitter(self) -> float:
+        """Return by how much time stamps are off [s]: by what an exactly known command differs."""
+        # where the command tells nothing
+        usual = 0.01 * self.period
+        if isinstance(self.command, RecordedCommand):
+            return usual
+        time, values = self.rates.time_s, self.rates.values
+        error = self.command(time) - values
+        slope = (self.command(time + 1e-4) - self.command(time - 1e-4)) / 2e-4
+        # jumps and corners of the command say nothing about time
+        good = ((np.abs(error) < 0.02 * np.ptp(values))
+                & (np.abs(slope) > 0.3 * np.abs(slope).max()))
+        if np.count_nonzero(good) < 50 or not np.any(slope[good]):
+            return usual
+        late = error[good] / slope[good]
+        return max(float(1.4826 * np.median(np.abs(late - np.median(late)))), 0.1 * usual)
+
+    @property
     def end(self) -> float:
         """Return the time of the last sample that can be compared [s]."""
         return float(self.time[-1])
@@ -123,11 +126,7 @@ class FieldRecording:
         return float(self.rates.time_s[np.argmax(moving)] if moving.any() else self.time[0])
 
     def command_between(self, begin: float, compared: float, end: float) -> CommandedRate:
-        """
-        Return the command of a window, in a time that counts from its beginning.
-
-        begin, compared, end : of the window, see `Window` [s]
-        """
+        """Return the command of a window, see `Window`, in a time that counts from its begin."""
         if begin == 0.0 and compared < _CLOCK_S and isinstance(self.command, SheetCommand):
             return self.command
         # later, the recorder's clock is off by more than its samples tell the command
@@ -189,7 +188,7 @@ def _from_its_start(name: str, recording: Recording, note: Note) -> Recording:
 
 
 def _command(name: str, waveform: sheets.Waveform | None, given: Channel,
-             note: Note) -> SheetCommand | RecordedCommand:
+             note: Note) -> CommandedRate:
     if waveform is None:
         note(f'{name}: no waveform in the sheet, the recorded command was interpolated')
     elif _is(exact := SheetCommand(waveform), given):

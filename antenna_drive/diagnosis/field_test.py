@@ -10,15 +10,13 @@ from functools import cached_property
 import math
 from typing import Any
 
-from antenna_drive.diagnosis.excitation import (
-    Bias, CommandedRate, Longest, schedule, SheetCommand,
-)
+from antenna_drive.diagnosis.excitation import Bias, CommandedRate, Longest, schedule, SheetCommand
 from antenna_drive.diagnosis.field_recording import FieldRecording, Note
 from antenna_drive.diagnosis.inference import completed
 from antenna_drive.diagnosis.late_readings import dense, lagging, Outputs, parts_of, read_at
 from antenna_drive.diagnosis.modifiers import SensorReadings
 from antenna_drive.diagnosis.recorded_command import RecordedCommand
-from antenna_drive.diagnosis.sensors import jitter_of, SensorModel, slips
+from antenna_drive.diagnosis.sensors import SensorModel, slips
 from antenna_drive.diagnosis.sheet_settings import as_the_sheet_says
 from antenna_drive.diagnosis.suitability import check
 from antenna_drive.diagnosis.windows import Window, windows
@@ -48,43 +46,28 @@ _FORGOTTEN_S = 2.0
 
 @dataclass(frozen=True)
 class FieldTest:
-    """
-    A window of a recording, prepared; its time counts from the beginning of the window.
+    """A window of a recording, prepared; its time counts from the beginning of the window."""
 
-    name : for people
-    record : of the drive as configured and as the sheet says, shape (1,)
-    command : axis rate command
-    bias : source of bias voltage, where the share circuit is not connected
-    time : of the samples that are compared, shape (n,) [s]
-    measured : readings, shape (n, c), NaN where there is none
-    slope : their slopes over time as recorded, shape (n, c), NaN where there is none
-    sensors : what they add
-    jitter : of the time stamps [s]
-    period : between two recorded samples [s]
-    sheet : what the tester knows, and what was inferred
-    known_start : False if the simulation begins in the middle of a motion, whose state is not
-        known; the zero of the encoder then follows from the readings alone
-    start_angle : of the axis at the beginning of the window, since that of the recording [rad];
-        waves go on where they were
-    labels : what was different in this test, by its sheet
-    excerpt : of the recording
-    """
-
-    name: str
+    name: str  # for people
+    # of the drive as configured and as the sheet says, shape (1,)
     record: np.ndarray[Any, np.dtype[Any]]
-    command: CommandedRate
-    bias: Bias
-    time: FloatArray
-    measured: FloatArray
-    slope: FloatArray
-    sensors: SensorModel
-    jitter: float
-    period: float
-    sheet: sheets.TestSheet
+    command: CommandedRate  # of the axis
+    bias: Bias  # source of bias voltage, where the share circuit is not connected
+    time: FloatArray  # of the samples that are compared, shape (n,) [s]
+    measured: FloatArray  # readings, shape (n, c), NaN where there is none
+    slope: FloatArray  # their slopes over time as recorded, shape (n, c), NaN where there is none
+    sensors: SensorModel  # what they add
+    jitter: float  # of the time stamps [s]
+    period: float  # between two recorded samples [s]
+    sheet: sheets.TestSheet  # what the tester knows, and what was inferred
+    # False if the simulation begins in the middle of a motion, whose state is not known; the zero
+    # of the encoder then follows from the readings alone
     known_start: bool = True
+    # of the axis at the beginning of the window, since that of the recording [rad]; waves go on
+    # where they were
     start_angle: float = 0.0
-    labels: Mapping[str, str] = field(default_factory=dict)
-    excerpt: Excerpt | None = None
+    labels: Mapping[str, str] = field(default_factory=dict)  # what was different, by the sheet
+    excerpt: Excerpt | None = None  # of the recording
 
     @cached_property
     def output_times(self) -> FloatArray:
@@ -99,8 +82,7 @@ class FieldTest:
     def until(self, end: float) -> FieldTest:
         """Return the first part of the test, of this length [s]."""
         n = int(np.searchsorted(self.time, self.time[0] + end))
-        return replace(self, time=self.time[:n], measured=self.measured[:n],
-                       slope=self.slope[:n])
+        return replace(self, time=self.time[:n], measured=self.measured[:n], slope=self.slope[:n])
 
     def simulated(self, longest_step: float) -> FloatArray:
         """Return the readings of the drive as configured, with steps of at most this [s]."""
@@ -112,7 +94,6 @@ class FieldTest:
         """
         Return the readings of a run, shape (n, c).
 
-        out : of the run, all readings
         errors : of the sensors, which nothing feeds back
         digits : readings of the encoder in digits, shape (n,); None if they tell none
         """
@@ -153,11 +134,8 @@ def prepared(recordings: Mapping[str, Recording], drive: Drive, note: Note) -> l
     """
     Make recordings of one machine ready: the windows that tell most, each a test of its own.
 
-    recordings : with their test sheets, by name
-    drive : the configuration
-    note : called with what was inferred or is missing
-
-    Raises UserError: a recording lacks the rate command or readings, or cannot be of this drive.
+    `note` is called with what was inferred or is missing. Raises UserError: a recording lacks the
+    rate command or readings, or cannot be of this drive.
     """
     found = [FieldRecording.of(name, recording, note) for name, recording in recordings.items()]
     for recording in found:
@@ -187,11 +165,10 @@ def window_of(recording: FieldRecording, window: Window, drive: Drive, bias: Bia
     if isinstance(command, RecordedCommand):
         for begin, end in command.holes + window.begin:
             measured[(time > begin) & (time < end + _FORGOTTEN_S)] = np.nan
-    resting = measured[time < recording.onset]
+    resting = measured[:np.searchsorted(time, recording.onset)]  # a view
     for tachometer in of(TACHOMETER):
         rates = resting[:, AT[tachometer.name]]
         rates[slips(rates, sensors.errors(tachometer).scatter)] = np.nan
-    measured[time < recording.onset] = resting
     angle = 0.0
     if window.begin > 0.0:
         drive = changed(drive, {'torque_share.circuit.start': 'steady'})
@@ -203,11 +180,9 @@ def window_of(recording: FieldRecording, window: Window, drive: Drive, bias: Bia
     if not math.isinf(window.end):
         name = f'{name} {window.compared:.0f}-{time[-1]:.0f} s'
     test = FieldTest(
-        name, record_of(drive), command,
-        bias.later(window.begin), time - window.begin, measured, slope,
-        sensors, jitter_of(recording.command, recording.rates.time_s, recording.rates.values),
-        recording.period, recording.sheet, window.known_start, angle,
-        dict(recording.sheet.labels or ()),
+        name, record_of(drive), command, replace(bias, at=bias.at - window.begin),
+        time - window.begin, measured, slope, sensors, recording.jitter, recording.period,
+        recording.sheet, window.known_start, angle, dict(recording.sheet.labels or ()),
         Excerpt(recording.name, recording.end + recording.later_s, window.begin))
     if not window.known_start:
         off = (measured - test.simulated(_STEP_S))[:, AT['encoder']]

@@ -8,9 +8,8 @@ difference of the currents; the whole drive is simulated with either. A value th
 is never overruled. A note says what was inferred, and by how much the next best value is worse.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cache
 
 from antenna_drive.diagnosis.bias_inference import (
@@ -38,9 +37,7 @@ def completed(recordings: Sequence[FieldRecording], drive: Drive,
     """
     Return recordings of one machine with what their sheets lack, as far as they tell it.
 
-    recordings : to be completed
-    drive : the configuration, which holds for what cannot be inferred
-    note : called with what was inferred, what is as configured, and what contradicts a sheet
+    `note` is called with what was inferred, is as configured, or contradicts a sheet.
     """
     found = list(recordings)
     if not any(recording.is_planned for recording in recordings):
@@ -56,8 +53,7 @@ def completed(recordings: Sequence[FieldRecording], drive: Drive,
 def _with_filter_1(recordings: list[FieldRecording], drive: Drive,
                    note: Note) -> list[FieldRecording]:
     """Return recordings whose sheets give Filter 1."""
-    compared = [recording for recording in recordings
-                if recording.readings.keys() & set(CURRENTS)]
+    compared = [recording for recording in recordings if recording.readings.keys() & set(CURRENTS)]
     if not compared:
         return recordings
 
@@ -89,7 +85,7 @@ def _misfit_of_currents(recording: FieldRecording, drive: Drive) -> float:
         end = max(end, bias.at)
     time = recording.thinned(first.compared, end + _SIMULATED_S)
     plan = schedule(recording.command_between(first.begin, first.compared, float(time[-1])),
-                    bias.later(first.begin), time - first.begin, Longest(_STEP_S))
+                    replace(bias, at=bias.at - first.begin), time - first.begin, Longest(_STEP_S))
     off = recording.measured(time)[0] - batch.run(record_of(drive), plan)[:, :, 0]
     off = off[:, [AT[name] for name in CURRENTS]]
     if np.isfinite(off).any(axis=0).all():

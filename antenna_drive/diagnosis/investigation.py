@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """An investigation of the drive: how its tests are run, recorded and diagnosed."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -34,14 +32,8 @@ class DriveBench(Bench):
     """
     A drive on which test sheets are played.
 
-    drive : the configuration of the model
-    limits : that no test may exceed
     base : what is known of every test: circuit, bias pot, sensors
-    play : plays a test on the drive
-    plan : of the investigation
-    sensors : whose errors are added to the recordings, for a drive that has none; None for a real
-        one
-    threads : simulations at once
+    sensors : whose errors are added to recordings; None for a drive that has sensors
     """
 
     played = 'test_{number}.yaml'
@@ -49,9 +41,8 @@ class DriveBench(Bench):
     def __init__(self, drive: Drive, limits: DriveLimits, base: TestSheet, play: RunTest,
                  plan: InvestigationPlan, sensors: SensorModel | None = None,
                  threads: int = 2) -> None:
-        """Keep what the drive is."""
         self.space = AntennaTests(base, drive, limits, plan.duration)
-        self.limits = limits.as_data()
+        self.limits = self.space.limits
         self._drive, self._base, self._play, self._seed = drive, base, play, plan.seed
         self._sensors, self._threads = sensors, threads
 
@@ -61,12 +52,10 @@ class DriveBench(Bench):
         path.write_text(dump_sheet(whole), encoding='utf-8')
 
     def run(self, number: int, test: Path, duration: float, out: Path) -> None:
-        """Play a sheet, see `Bench`."""
         self._play(number, test, duration, out)
 
     def diagnose(self, recordings: Mapping[str, Path], progress: Progress,
                  earlier: Sequence[Rival]) -> Verdict:
-        """Return the diagnosis of all recordings, see `Bench`."""
         found = {}
         for k, (name, path) in enumerate(recordings.items(), 1):
             found[name] = read_recording(path)
@@ -79,12 +68,8 @@ def sensed(recording: Recording, sensors: SensorModel, seed: Sequence[int]) -> R
     """
     Return the recording of an emulated drive as sensors would have read it.
 
-    The nodes give true values. A residual of theirs is smoother than any noise, and a verdict
-    would take that for something unknown.
-
-    recording : with the readings of every macro-step
-    sensors : whose errors are added
-    seed : of their noise
+    The nodes give true values at every macro-step. A residual of theirs is smoother than any
+    noise, and a verdict would take that for something unknown.
     """
     command = recording[RATE_COMMAND]
     every = slice(None, None, max(1, round(1.0 / _RATE_HZ / float(

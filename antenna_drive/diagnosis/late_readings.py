@@ -8,8 +8,6 @@ some times between the samples, too, and a reading is interpolated between them 
 slopes. To first order alone, a delay of 7 ms at 5 Hz is off by 2 percent of the signal.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 import math
@@ -77,21 +75,15 @@ class RipplingTachometer:
     A tachometer whose ripple may be faster than the outputs of a run.
 
     What is interpolated is the motion of its rotor, from which the reading follows.
-
-    angle : of its rotor at each output, shape (n,) [rad]
-    numbers : its record, shape (1,), see `parameters.sets.Tachometer`
     """
 
-    angle: FloatArray
+    angle: FloatArray  # of its rotor at each output, shape (n,) [rad]
+    # its record, shape (1,), see `parameters.sets.Tachometer`
     numbers: np.ndarray[Any, np.dtype[Any]]
 
     def read_at(self, time: FloatArray, out: FloatArray, wanted: FloatArray,
                 late: float) -> FloatArray:
-        """
-        Return readings at other times, shape (m,) [rad/s].
-
-        Parameters are those of `late_readings.read_at`, for one channel: `out` has shape (n, 2).
-        """
+        """Return readings at other times, shape (m,) [rad/s]; `out` has shape (n, 2)."""
         motion = np.empty((self.angle.size, 2, 2))
         _motion(self.angle, out, self.numbers, motion)
         later = read_at(time, motion, wanted, np.full(2, late))
@@ -102,15 +94,10 @@ class RipplingTachometer:
 
 @dataclass(frozen=True)
 class Outputs:
-    """
-    What a run gives at the output times.
+    """What a run gives at the output times."""
 
-    values : and slopes of n channels, shape (times, n, 2)
-    rippling : tachometers with a ripple, by the names of their readings
-    """
-
-    values: FloatArray
-    rippling: Mapping[str, RipplingTachometer]
+    values: FloatArray  # and slopes of n channels, shape (times, n, 2)
+    rippling: Mapping[str, RipplingTachometer]  # those with a ripple, by names of readings
 
 
 @compiled

@@ -116,8 +116,7 @@ class AntennaMachine(Machine):
         self.notes = notes
         self._digit = _coarser_digit(self._tests)
         tolerances = nuisances(self._tests, max(given, default=_TOLERANCE))
-        wind = everyday_wind_torque(self._tests[0])
-        effects = catalogue([float(test.time[-1]) for test in self._tests], self._digit, wind)
+        effects = catalogue(self._digit)
         self.words = words(effects.values(), drive, self._tests[0].record)
         modifiers = KnownModifiers()
         self._run_modifiers, self._reading_modifiers = modifiers.of_runs, modifiers.of_readings
@@ -125,7 +124,7 @@ class AntennaMachine(Machine):
                          AntennaCatalogue((tolerated(effect, tolerances)
                                            for effect in effects.values()),
                                           modifiers, self._digit > 0.0))
-        self.disturbance_inputs = tuple(disturbances(wind))
+        self.disturbance_inputs = tuple(disturbances(everyday_wind_torque(self._tests[0])))
         self.experiments = self._experiments({})
         self.planning = {'sheet': sheet_tree(_in_common(test.sheet for test in self._tests))}
 

@@ -6,11 +6,9 @@ What a parameter does: it modifies the run before it is simulated, or the readin
 Each entry of the catalogue, and each tolerance, declares its modifier where it stands.
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 import math
 from typing import Any
 
@@ -21,23 +19,18 @@ import numpy as np
 from simgap.machine.contract import FloatArray, Parameter
 
 SCALE, ADD, SET = 'scale', 'add', 'set'
+# Ends of the names of a wave's amplitudes in the record.
+HARMONICS = ('', '_second', '_third')
 
 
 @dataclass(frozen=True)
 class WaveShape:
-    """
-    Where a wave is and which angle it follows.
+    """Where a wave is and which angle it follows."""
 
-    stem : what the names of the amplitude, cycles and phases in the record begin with
-    paths : where these fields are
-    angle : 'motor_1', 'motor_2' or 'axis'
-    order : cycles per revolution; 0 if not chosen yet
-    """
-
-    stem: str
-    paths: tuple[str, ...]
-    angle: str
-    order: float = 0.0
+    stem: str  # what names of the amplitude, cycles and phases in the record begin with
+    paths: tuple[str, ...]  # where these fields are
+    angle: str  # 'motor_1', 'motor_2' or 'axis'
+    order: float = 0.0  # cycles per revolution; 0 if not chosen yet
 
     def fields(self, parts: Sequence[float], turned: float = 0.0) -> dict[str, float]:
         """
@@ -47,53 +40,45 @@ class WaveShape:
             the third harmonic
         turned : angle from which the angle of the record counts [rad]
         """
-        sine, cosine, change, second_sine, second_cosine, third_sine, third_cosine = parts
-        cycles = self.order * (1.0 + change)
+        cycles = self.order * (1.0 + parts[2])
         phase = math.remainder(cycles * turned, math.tau)
-        return {'': math.hypot(sine, cosine),
-                '_phase': math.atan2(cosine, sine) + phase,
-                '_cycles': cycles,
-                '_second': math.hypot(second_sine, second_cosine),
-                '_second_phase': math.atan2(second_cosine, second_sine) + 2.0 * phase,
-                '_third': math.hypot(third_sine, third_cosine),
-                '_third_phase': math.atan2(third_cosine, third_sine) + 3.0 * phase}
+        found = {'_cycles': cycles}
+        for k, sine, cosine in _harmonics(parts):
+            end = HARMONICS[k - 1]
+            found[end] = math.hypot(sine, cosine)
+            found[f'{end}_phase'] = math.atan2(cosine, sine) + k * phase
+        return found
 
     def along(self, angle: FloatArray, parts: Sequence[float]) -> FloatArray:
         """Return the wave at angles of shape (n,); `parts` as in `fields`."""
-        sine, cosine, change, *higher = parts
         total = np.zeros_like(angle)
-        amplitudes = (sine, cosine, *higher)
-        for k, (a, b) in enumerate(zip(amplitudes[::2], amplitudes[1::2], strict=True), start=1):
-            turned = k * self.order * (1.0 + change) * angle
-            total += a * np.sin(turned) + b * np.cos(turned)
+        for k, sine, cosine in _harmonics(parts):
+            turned = k * self.order * (1.0 + parts[2]) * angle
+            total += sine * np.sin(turned) + cosine * np.cos(turned)
         return total
+
+
+def _harmonics(parts: Sequence[float]) -> Iterator[tuple[int, float, float]]:
+    """Yield number, sine and cosine part of each harmonic."""
+    sizes = (*parts[:2], *parts[3:])
+    return zip(range(1, len(HARMONICS) + 1), sizes[::2], sizes[1::2], strict=True)
 
 
 @dataclass
 class RunSetup:
-    """
-    A run as parameters modify it.
+    """A run as parameters modify it."""
 
-    numbers : the drive's record as plain numbers: numpy copies a record field by field
-    kind : type of the record
-    duration_s : of the test
-    bias : source of the bias voltage, where the share circuit is not connected
-    gust : torque on the axis at its knots [N m]; None for none
-    late_jumps : by how much jumps of the command come later, by number [s]
-    hole_means : by how much the mean of the command is higher in its holes, by number [rad/s]
-    waves : parts of each wave
-    start_angle : of the axis at the beginning [rad]; waves go on from there
-    """
-
-    numbers: FloatArray
-    kind: np.dtype[Any]
-    duration_s: float
-    bias: Bias
-    gust: FloatArray | None = None
+    numbers: FloatArray  # the drive's record as plain ones: numpy copies a record by field
+    kind: np.dtype[Any]  # of the record
+    duration_s: float  # of the test
+    bias: Bias  # source of the bias voltage, where the share circuit is not connected
+    wind: FloatArray | None = None  # torque on the axis at its knots [N m]; None for none
+    # by number: how much later jumps of the command come [s], how much higher the mean of the
+    # command is in its holes [rad/s]
     late_jumps: dict[int, float] = field(default_factory=dict)
     hole_means: dict[int, float] = field(default_factory=dict)
-    waves: dict[WaveShape, list[float]] = field(default_factory=dict)
-    start_angle: float = 0.0
+    waves: dict[WaveShape, list[float]] = field(default_factory=dict)  # parts of each
+    start_angle: float = 0.0  # of the axis at the beginning [rad]; waves go on from there
 
     def change(self, path: str, how: str, value: float) -> None:
         """Scale a number of the record by 1 + value, add the value to it, or set it."""
@@ -123,27 +108,19 @@ class RunSetup:
 
 @dataclass
 class SensorReadings:
-    """
-    What parameters do to the readings of a run.
+    """What parameters do to the readings of a run."""
 
-    gain, zero, delay, lag : of every reading, shape (c,); the delay is by how much earlier it is
-        read than its time stamps say [s], the lag the time constant of a filter before [s]
-    clock : by how much later all readings are taken [s]
-    clock_rate : share by which the recorder's clock is slow
-    digit : of the encoder [rad]; 0 for none
-    turn : share of a digit by which the encoder's rounding is off its middle
-    waves : parts of each wave of the encoder
-    """
-
+    # of every reading, shape (c,); the delay is by how much earlier it is read than its time
+    # stamps say [s], the lag the time constant of a filter before [s]
     gain: FloatArray = field(default_factory=lambda: np.ones(len(READINGS)))
     zero: FloatArray = field(default_factory=lambda: np.zeros(len(READINGS)))
     delay: FloatArray = field(default_factory=lambda: np.zeros(len(READINGS)))
     lag: FloatArray = field(default_factory=lambda: np.zeros(len(READINGS)))
-    clock: float = 0.0
-    clock_rate: float = 0.0
-    digit: float = 0.0
-    turn: float = 0.0
-    waves: dict[WaveShape, list[float]] = field(default_factory=dict)
+    clock: float = 0.0  # by how much later all readings are taken [s]
+    clock_rate: float = 0.0  # share by which the recorder's clock is slow
+    digit: float = 0.0  # of the encoder [rad]; 0 for none
+    turn: float = 0.0  # share of a digit by which the encoder's rounding is off its middle
+    waves: dict[WaveShape, list[float]] = field(default_factory=dict)  # parts of each, encoder's
 
     @property
     def late(self) -> FloatArray:
@@ -152,15 +129,10 @@ class SensorReadings:
 
 
 class Modifier(ABC):
-    """
-    What a parameter does.
+    """What a parameter does."""
 
-    fields : the numbers of the drive's configuration that it stands for
-    how : how it changes them
-    """
-
-    fields: tuple[str, ...] = ()
-    how: str = ADD
+    fields: tuple[str, ...] = ()  # the numbers of the drive's configuration that it stands for
+    how: str = ADD  # how it changes them
 
 
 class RunModifier(Modifier):
@@ -202,8 +174,8 @@ class SupplyGain(RunModifier):
     """Scales the voltages of the source of bias."""
 
     def apply(self, run: RunSetup, value: float) -> None:
-        run.bias = Bias(run.bias.before * (1.0 + value), run.bias.after * (1.0 + value),
-                        run.bias.at)
+        run.bias = replace(run.bias, before=run.bias.before * (1.0 + value),
+                           after=run.bias.after * (1.0 + value))
 
 
 @dataclass(frozen=True)
@@ -214,11 +186,6 @@ class RecorderError(ReadingModifier):
     reading: str = ''
     fields: tuple[str, ...] = ()
 
-    @property
-    def name(self) -> str:
-        """Return its name in a verdict."""
-        return f'{self.kind}:{self.reading}' if self.reading else self.kind
-
     def apply_to_readings(self, readings: SensorReadings, value: float) -> None:
         if self.reading:
             getattr(readings, self.kind)[AT[self.reading]] += value
@@ -228,13 +195,9 @@ class RecorderError(ReadingModifier):
 
 @dataclass(frozen=True)
 class Unrecorded(RunModifier):
-    """
-    What a recorded command does not show: `late_jumps` or `hole_means` of a `RunSetup`.
+    """What no sample of a recorded command shows, such as when it jumped between two."""
 
-    Between the samples of a recorded command nobody knows when it jumped.
-    """
-
-    what: str
+    what: str  # `late_jumps` or `hole_means` of a `RunSetup`
     number: int
 
     def apply(self, run: RunSetup, value: float) -> None:
@@ -276,13 +239,10 @@ def set_to(*fields: str) -> FieldChange:
 
 
 class KnownModifiers:
-    """
-    What parameters do, by their names: a point is plain numbers.
-
-    of_runs, of_readings : modifiers, each with the index of the one test that it acts on, or None
-    """
+    """What parameters do, by their names: a point is plain numbers."""
 
     def __init__(self) -> None:
+        # each with the index of the one test that it acts on, or None
         self.of_runs: dict[str, tuple[RunModifier, int | None]] = {}
         self.of_readings: dict[str, tuple[ReadingModifier, int | None]] = {}
 
@@ -292,8 +252,7 @@ class KnownModifiers:
             assert isinstance(item, AntennaParameter)
             if isinstance(item.modifier, RunModifier):
                 self.of_runs[item.name] = item.modifier, item.experiment
-            else:
-                assert isinstance(item.modifier, ReadingModifier)
+            elif isinstance(item.modifier, ReadingModifier):
                 self.of_readings[item.name] = item.modifier, item.experiment
 
     def of(self, name: str) -> Modifier:

@@ -2,13 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """The tables of steps of runs, which are kept while runs differ in their numbers alone."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import lru_cache
 from typing import TypeAlias
 
-from antenna_drive.diagnosis import gust
+from antenna_drive.diagnosis import wind
 from antenna_drive.diagnosis.disturbances import DriveDisturbance
 from antenna_drive.diagnosis.excitation import Bias, Longest, schedule, with_bias, with_torque
 from antenna_drive.diagnosis.field_test import FieldTest
@@ -34,7 +32,7 @@ class Plans:
 
     def steps(self, k: int, run: RunSetup, longest: Longest) -> batch.Schedule:
         """Return the steps of a run of test k, none of which is longer than allowed."""
-        torque = () if run.gust is None else tuple(run.gust.tolist())
+        torque = () if run.wind is None else tuple(run.wind.tolist())
         return self._kept(k, longest, run.delay, tuple(run.late_jumps.items()),
                           tuple(run.hole_means.items()), run.bias, torque)
 
@@ -43,7 +41,7 @@ class Plans:
         test = self._tests[k]
         if torque:
             calm = self._kept(k, longest, delay, late_jumps, hole_means, bias, ())
-            return with_torque(calm, *gust.course(np.array(torque)))
+            return with_torque(calm, *wind.course(np.array(torque)))
         if bias != test.bias:
             return with_bias(
                 self._kept(k, longest, delay, late_jumps, hole_means, test.bias, ()), bias)

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A recording predicted from its rate command and test sheet alone."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 import math
@@ -26,11 +24,7 @@ from simgap.machine.contract import FloatArray
 
 
 def recorder_errors(entries: Iterable[Mapping[str, Any]]) -> SensorReadings:
-    """
-    Take the entries of a verdict's `recorder`.
-
-    Raises UserError: an entry is none.
-    """
+    """Take the entries of a verdict's `recorder`; UserError if one is none."""
     found = SensorReadings()
     for entry in entries:
         try:
@@ -51,16 +45,11 @@ def recorder_errors(entries: Iterable[Mapping[str, Any]]) -> SensorReadings:
 
 @dataclass(frozen=True)
 class Prediction:
-    """
-    A recording and its prediction, at all of its times.
+    """A recording and its prediction, at all of its times."""
 
-    time : of the samples, as recorded, shape (n,) [s]
-    measured, predicted : shape (n, c); NaN where nothing was measured
-    """
-
-    time: FloatArray
-    measured: FloatArray
-    predicted: FloatArray
+    time: FloatArray  # of the samples, as recorded, shape (n,) [s]
+    measured: FloatArray  # readings, shape (n, c); NaN where there is none
+    predicted: FloatArray  # readings, shape (n, c)
 
     def rms(self) -> dict[str, tuple[float, str]]:
         """Return the rms of measured minus predicted of each signal, with its unit."""
@@ -83,15 +72,10 @@ class Prediction:
 def predict(name: str, recording: Recording, drive: Drive, recorder: SensorReadings | None = None,
             note: Note = lambda text: None) -> Prediction:
     """
-    Predict a recording from its rate command and its test sheet.
+    Predict a recording, whose readings are compared and not used.
 
-    name : for people
-    recording : its readings are compared and not used
-    drive : the configuration
-    recorder : its errors; None for none
-    note : called with what was inferred or is missing
-
-    Raises UserError: the recording lacks its rate command or any reading, or the run diverged.
+    `recorder` has its errors; `note` is called with what was inferred or is missing. Raises
+    UserError: the recording lacks its rate command or any reading, or the run diverged.
     """
     test = FieldRecording.of(name, recording, note)
     predicted = _readings(test, *as_the_sheet_says(test.sheet, drive),

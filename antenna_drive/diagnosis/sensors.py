@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
 """
-Errors of the sensors: noise, resolution, jitter of the time stamps, and samples to be left out.
+Errors of the sensors: noise, resolution, and samples to be left out.
 
 No drive makes spikes of one sample. A motor at rest creeps, sticks and slips within its gap; when
 it slips is decided by differences that no model knows.
@@ -12,8 +12,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from antenna_drive.diagnosis.excitation import CommandedRate
-from antenna_drive.diagnosis.recorded_command import RecordedCommand
 from antenna_drive.readings import Errors, Reading, READINGS, SENSORS
 from antenna_drive.recording import sheet as sheets
 import numpy as np
@@ -49,11 +47,9 @@ class SensorModel:
     @classmethod
     def of(cls, given: sheets.Sensors | None) -> SensorModel:
         """Take the values of the sheet."""
-        known = {}
-        for number in (number for sensor in SENSORS for number in sensor.numbers):
-            value = getattr(given, number.key, None)
-            known[number.key] = number.usual if value is None else value
-        return cls(known)
+        usual = {number.key: number.usual for sensor in SENSORS for number in sensor.numbers}
+        said = {key: getattr(given, key, None) for key in usual}
+        return cls({key: usual[key] if value is None else value for key, value in said.items()})
 
     def errors(self, reading: Reading, true: FloatArray | float = 0.0) -> Errors:
         """Return what the sensor of a reading does to true values."""
@@ -76,25 +72,6 @@ class SensorModel:
             if errors.digit > 0.0:
                 found[:, c] = errors.digit * np.round(found[:, c] / errors.digit)
         return found
-
-
-def jitter_of(command: CommandedRate, time: FloatArray, values: FloatArray) -> float:
-    """
-    Return by how much time stamps are off [s]: by what an exactly known command differs.
-
-    Where the command tells nothing, a hundredth of the spacing is assumed.
-    """
-    usual = 0.01 * float(np.median(np.diff(time)))
-    if isinstance(command, RecordedCommand):
-        return usual
-    error = command(time) - values
-    slope = (command(time + 1e-4) - command(time - 1e-4)) / 2e-4
-    # jumps and corners of the command say nothing about time
-    good = (np.abs(error) < 0.02 * np.ptp(values)) & (np.abs(slope) > 0.3 * np.abs(slope).max())
-    if np.count_nonzero(good) < 50 or not np.any(slope[good]):
-        return usual
-    late = error[good] / slope[good]
-    return max(float(1.4826 * np.median(np.abs(late - np.median(late)))), 0.1 * usual)
 
 
 def digit_of(values: FloatArray) -> float:
@@ -132,15 +109,12 @@ def spikes(values: FloatArray) -> NDArray[np.bool_]:
     usual = max(1.4826 * float(np.median(off)), float(np.sqrt(np.mean(np.minimum(
         off, np.quantile(off, 0.95)) ** 2))))
     # the ranks around a sample are wanted of few samples only
-    found = np.zeros(values.size, dtype=bool)
-    likely = off > _SCATTERS * usual
-    likely &= off > _AROUND * (neighbours[3] - neighbours[0])
-    if likely.any():
+    found = (off > _SCATTERS * usual) & (off > _AROUND * (neighbours[3] - neighbours[0]))
+    if found.any():
         footprint = np.ones(_NEIGHBOURHOOD + 1, dtype=bool)
         footprint[_NEIGHBOURHOOD // 2] = False
-        around = rank_filter(off, -2, footprint=footprint, mode='reflect')
-        found = likely & (off > _AROUND * around)
-    return found
+        found &= off > _AROUND * rank_filter(off, -2, footprint=footprint, mode='reflect')
+    return np.asarray(found)
 
 
 def slips(rates: FloatArray, noise: float) -> NDArray[np.bool_]:

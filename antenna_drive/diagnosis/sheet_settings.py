@@ -1,17 +1,21 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a test sheet sets in the drive: the circuits of Table 1, the elevation, the bias."""
+"""What a test sheet sets in the drive, or in its nodes: circuits of Table 1, elevation, bias."""
 
-from __future__ import annotations
-
-from functools import cache, reduce
+from functools import cache
 import math
+from operator import attrgetter
 from typing import Any
 
 from antenna_drive.diagnosis.excitation import Bias
+from antenna_drive.emulator.units import home
+from antenna_drive.emulator.wiring import TEST_SIGNAL
 from antenna_drive.parameters.loading import load
-from antenna_drive.parameters.sets import changed, Drive
+from antenna_drive.parameters.sets import changed, Drive, values
 from antenna_drive.recording import sheet as sheets
+from antenna_drive.recording.sheet_signal import settings_for
+from simgap.errors import UserError
+from simgap.inputs.schema import Value
 
 CIRCUITS = ('new', 'old')
 # The numbers that a test sheet's name of a circuit stands for.
@@ -39,12 +43,7 @@ def nearest_circuit(drive: Drive, entry: str) -> str:
 
 def _numbers(drive: Drive, entry: str) -> dict[str, float]:
     part, keys = _NUMBERS[entry]
-    return {path: float(value_of(drive, path)) for path in (f'{part}.{key}' for key in keys)}
-
-
-def value_of(drive: Drive, path: str) -> Any:
-    """Return what a configuration says of a dotted name."""
-    return reduce(getattr, path.split('.'), drive)
+    return {path: float(attrgetter(path)(drive)) for path in (f'{part}.{key}' for key in keys)}
 
 
 def as_the_sheet_says(sheet: sheets.TestSheet, drive: Drive) -> tuple[Drive, Bias]:
@@ -69,3 +68,26 @@ def as_the_sheet_says(sheet: sheets.TestSheet, drive: Drive) -> tuple[Drive, Bia
     source = (Bias(0.0, voltage, given.at_s or 0.0) if isinstance(given, sheets.FixedStepBias)
               else Bias(voltage, voltage))
     return changed(drive, {**changes, f'{share}.bias_source': 'fixed'}), source
+
+
+def parameters_of(sheet: sheets.TestSheet, drive: Drive) -> dict[str, dict[str, Value]]:
+    """
+    Return what to set on each node, by unit and name, so that the drive runs a test.
+
+    Raises UserError: there is no waveform, or the bias is to step in the middle of the test.
+    """
+    if sheet.waveform is None:
+        raise UserError('waveform: is missing, there is nothing to play')
+    if isinstance(sheet.bias, sheets.FixedStepBias):
+        raise UserError('bias: fixed_step: a node plays circuit or fixed; set fixed_voltage by '
+                        'hand when it is time')
+    tested, bias = as_the_sheet_says(sheet, drive)
+    if isinstance(sheet.bias, sheets.FixedBias):
+        tested = changed(tested, {'torque_share.circuit.fixed_voltage': bias.after})
+    found: dict[str, dict[str, Value]] = {}
+    for (path, _, before), (_, _, after) in zip(values(drive), values(tested), strict=True):
+        if before != after:
+            unit, name = home(path)
+            found.setdefault(unit, {})[name] = after
+    found.setdefault(TEST_SIGNAL, {}).update(settings_for(sheet.waveform))
+    return found

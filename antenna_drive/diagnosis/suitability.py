@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Whether the columns of a recording can be of this drive: units, and what is in them."""
 
-from __future__ import annotations
-
 import math
 
 from antenna_drive.diagnosis.field_recording import FieldRecording, Note
@@ -36,11 +34,7 @@ _AMPERES = 'give article amperes, one of which is about six real ones'
 
 def check(recording: FieldRecording, drive: Drive, note: Note) -> None:
     """
-    Check that a recording can be of this drive.
-
-    recording : to be checked
-    drive : the configuration
-    note : called with what is doubtful
+    Check that a recording can be of this drive; `note` is called with what is doubtful.
 
     Raises UserError: a column is in other units or holds something else; the message gives the
     remedy.

@@ -14,12 +14,12 @@ from itertools import product
 import math
 
 from antenna_drive.diagnosis.field_test import FieldTest
-from antenna_drive.diagnosis.gust import everyday_wind, WIDEST
 from antenna_drive.diagnosis.modifiers import (
     ADD, add, AntennaParameter, KnownModifiers, Modifier, RecorderError, scale, SupplyGain,
     Unrecorded,
 )
 from antenna_drive.diagnosis.recorded_command import RecordedCommand
+from antenna_drive.diagnosis.wind import everyday_wind, WIDEST
 from antenna_drive.readings import Reading, READINGS
 from antenna_drive.recording.sheet import Tolerances, USUAL
 import numpy as np

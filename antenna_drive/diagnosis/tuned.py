@@ -8,8 +8,6 @@ numbers is several times closer to it than one with the numbers of the drawing. 
 is beyond the tolerances: the machine is not the one of the configuration.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 import tempfile
@@ -37,14 +35,10 @@ _NOISE = 3.0
 
 @dataclass(frozen=True)
 class Tuned:
-    """
-    What a quiet record shows of a drive.
+    """What a quiet record shows of a drive."""
 
-    text : of a configuration file with the tolerances as they were fitted
-    outside : what the record has beyond all tolerances, a line for each signal, the greatest first
-    """
-
-    text: str
+    text: str  # of a configuration file with the tolerances as they were fitted
+    # what the record has beyond all tolerances, a line for each signal, the greatest first
     outside: tuple[str, ...] = ()
 
 
@@ -52,10 +46,8 @@ def tuned(recording: Recording, drive: Drive) -> Tuned:
     """
     Return the configuration with the tolerances as a quiet record shows them, and what is beyond.
 
-    recording : of a healthy drive that stood still at the beginning, with its test sheet
-    drive : the configuration
-
-    Raises UserError: the recording cannot be compared with the drive.
+    The healthy drive of the record stood still at the beginning. Raises UserError: the recording
+    cannot be compared with the drive.
     """
     machine = AntennaMachine({'quiet record': recording}, drive, threads=1)
     problem = LeastSquares(machine)
@@ -74,12 +66,12 @@ def tuned(recording: Recording, drive: Drive) -> Tuned:
 def _outside(problem: LeastSquares, state: FitState) -> tuple[str, ...]:
     """Return the signals of which a fit of the tolerances leaves more than noise."""
     [test] = problem.experiments
-    [predicted] = problem.machine.simulate([state.point()])[0]
+    predicted = problem.machine.predict(state.point(), 0)
     left = problem.residuals_of(state, 0)
     found = []
     for column, reading in enumerate(READINGS):
         there = np.isfinite(left[:, column])
-        if predicted is None or not there.any():
+        if not there.any():
             continue
         level = problem.scale * robust_level(left[there, column], DEFAULT.fit.outlier)
         if level > _NOISE:
@@ -90,11 +82,7 @@ def _outside(problem: LeastSquares, state: FitState) -> tuple[str, ...]:
 
 
 def loaded(text: str) -> Drive:
-    """
-    Return the drive of a configuration file that is kept as text.
-
-    Raises ParameterError: an entry is not allowed.
-    """
+    """Return the drive of a configuration file that is kept as text; ParameterError if wrong."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / 'tuned.yaml'
         path.write_text(text, encoding='utf-8')

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from antenna_drive.diagnosis.modifiers import (
-    AntennaParameter, ReadingModifier, RunModifier, RunSetup, SensorReadings, WaveShape,
+    AntennaParameter, HARMONICS, ReadingModifier, RunModifier, RunSetup, SensorReadings, WaveShape,
 )
 import numpy as np
 from simgap.machine.contract import Form
@@ -23,18 +23,14 @@ _OF_MOTORS = tuple((motor, part, stem) for motor in ('motor_1', 'motor_2') for p
 
 def is_there(numbers: np.ndarray[Any, np.dtype[Any]], stem: str) -> bool:
     """Return whether the record of a part, shape (1,), has a wave whose names begin so."""
-    return any(numbers[stem + end][0] != 0.0 for end in ('', '_second', '_third'))
+    return any(numbers[stem + end][0] != 0.0 for end in HARMONICS)
 
 
 def fastest_wave(record: np.ndarray[Any, np.dtype[Any]]) -> float:
     """Return the cycles per turn of the axis of the fastest wave in a drive's record; 0: none."""
-    cycles = 0.0
-    for motor, part, stem in _OF_MOTORS:
-        numbers = record[motor][part]
-        if is_there(numbers, stem):
-            cycles = max(cycles, float(numbers[f'{stem}_cycles'][0])
-                         * float(record[motor]['gear_ratio'][0]))
-    return cycles
+    return max((float(record[motor][part][f'{stem}_cycles'][0])
+                * float(record[motor]['gear_ratio'][0]) for motor, part, stem in _OF_MOTORS
+                if is_there(record[motor][part], stem)), default=0.0)
 
 
 @dataclass(frozen=True)
@@ -68,22 +64,13 @@ class _ReadingWavePart(_Part, ReadingModifier):
 
 @dataclass(frozen=True)
 class Wave(Form):
-    """
-    A wave of three harmonics by their sine and cosine parts.
-
-    shape : where it is
-    orders : cycles per revolution to look for
-    """
+    """A wave of three harmonics by their sine and cosine parts."""
 
     shape: WaveShape = WaveShape('', (), '')
-    orders: tuple[float, ...] = ()
+    orders: tuple[float, ...] = ()  # cycles per revolution to look for
 
     def order_of(self, name: str) -> float:
-        """
-        Return the order in the name of a form that `at` has made.
-
-        Raises KeyError: there is none in it.
-        """
+        """Return the order in the name of a form that `at` has made; KeyError if there is none."""
         try:
             return float(name.removesuffix(_CYCLES))
         except ValueError:
@@ -92,24 +79,21 @@ class Wave(Form):
     def at(self, order: float) -> Wave:
         """Return the form for one order, with parameters of its own."""
         shape = replace(self.shape, order=order)
-        parameters = []
-        for part in self.parameters:
-            assert isinstance(part, AntennaParameter)
-            assert isinstance(part.modifier, _Part)
-            parameters.append(replace(part, name=f'{part.name}@{order:g}',
-                                      modifier=replace(part.modifier, shape=shape)))
-        return replace(self, name=f'{order:g}{_CYCLES}',
-                       parameters=tuple(parameters), shape=shape, scanned=True)
+
+        def of_order(part: Any) -> AntennaParameter:
+            return replace(part, name=f'{part.name}@{order:g}',
+                           modifier=replace(part.modifier, shape=shape))
+
+        return replace(self, name=f'{order:g}{_CYCLES}', shape=shape, scanned=True,
+                       parameters=tuple(map(of_order, self.parameters)))
 
 
 def wave(unit: str, limit: float, step: float, shape: WaveShape, orders: tuple[float, ...],
          on_readings: bool = False, healthy: float = 0.0) -> Wave:
     """
-    Return the form of a wave whose order is not chosen yet.
+    Return the form of a wave whose order is not chosen yet, see `Wave`.
 
     unit, limit, step : of each amplitude: unit, greatest size, step of the difference quotient
-    shape : where it is
-    orders : cycles per revolution to look for
     on_readings : True if nothing feeds the wave back
     healthy : amplitude of each part that a machine in good order may have
     """

@@ -10,12 +10,9 @@ start of the motion is preferred, because the drive stood still before. The stat
 a motion is not known; such a part is simulated for a while before it is compared.
 """
 
-from __future__ import annotations
-
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 import math
-from typing import Any
 
 from antenna_drive.diagnosis.excitation import Bias, Longest, schedule
 from antenna_drive.diagnosis.field_recording import FieldRecording, SOUGHT_S
@@ -25,8 +22,8 @@ from antenna_drive.parameters.records import place_of, record_of
 from antenna_drive.parameters.sets import Drive
 from antenna_drive.readings import READINGS
 import numpy as np
+from simgap.machine.contract import FloatArray
 
-Record = np.ndarray[Any, np.dtype[Any]]
 # A recording of up to this length is taken whole [s] ...
 WHOLE_S = 35.0
 # ... if its motion begins this soon [s].
@@ -72,47 +69,26 @@ _EFFECTS = (
 
 @dataclass(frozen=True)
 class Window:
-    """
-    A part of a recording.
+    """A part of a recording."""
 
-    begin : of the simulation [s]
-    compared : from this time on readings are compared [s]
-    end : of the window [s]
-    known_start : the drive stood still until `begin`
-    """
-
-    begin: float = 0.0
-    compared: float = 0.0
-    end: float = math.inf
-    known_start: bool = True
-
-    @property
-    def cost(self) -> float:
-        """Return how much more this window must tell than one without cost."""
-        return (_COST_PER_S * (self.compared - self.begin)
-                + (0.0 if self.known_start else _UNKNOWN_COST))
+    begin: float = 0.0  # of the simulation [s]
+    compared: float = 0.0  # from this time on readings are compared [s]
+    end: float = math.inf  # of the window [s]
+    known_start: bool = True  # the drive stood still until `begin`
 
 
 def windows(recording: FieldRecording, drive: Drive, bias: Bias, most: int) -> list[Window]:
-    """
-    Return the windows of a recording that tell most, in the order of time.
-
-    recording : to look at
-    drive : as the sheet says
-    bias : source of bias voltage
-    most : how many windows there may be
-    """
+    """Return the windows of a recording that tell most, at most so many, in the order of time."""
     first = first_window(recording)
     if recording.end <= first.end:
         return [first]
-    telling = _Telling(recording, drive, bias)
+    energy = _energy(recording, drive, bias)
     choices = [[first], *([window] for window in _later(recording, first, _COMPARED_S))]
     if most > 1:
         short = replace(first, end=first.compared + 0.5 * _COMPARED_S)
         choices += [[short, window] for window in _later(recording, first, 0.5 * _COMPARED_S)
                     if window.compared >= short.end]
-    worth = [telling.of(choice) - sum(window.cost for window in choice) for choice in choices]
-    return choices[int(np.argmax(worth))]
+    return max(choices, key=lambda choice: _worth(energy, choice))
 
 
 def first_window(recording: FieldRecording) -> Window:
@@ -135,37 +111,31 @@ def _later(recording: FieldRecording, first: Window, length: float) -> Iterator[
                      compared + length, known)
 
 
-class _Telling:
-    """How far the responses to some effects stand out from the noise over time."""
-
-    def __init__(self, recording: FieldRecording, drive: Drive, bias: Bias) -> None:
-        """Run the drive without the effects, and with each."""
-        samples = np.arange(0.0, min(recording.end, SOUGHT_S), _SAMPLE_S)
-        plan = schedule(recording.command, bias, samples, Longest(_STEP_S))
-        plain = batch.run(record_of(drive), plan)
-        noise = SensorModel.of(recording.sheet.sensors).noise(
-            plain[:, :, 0], plain[:, :, 1], 0.01 * recording.period)
-        energy = []
-        for effect in _EFFECTS:
-            moved = batch.run(_scaled(record_of(drive), effect), plan)
-            response = (moved[:, :, 0] - plain[:, :, 0]) / noise
-            response = np.clip(np.compress(_COMPARED, response, axis=1), -_MOST, _MOST)
-            energy.append(np.sum(np.nan_to_num(response) ** 2, axis=1))
-        self._until = np.vstack([np.zeros(len(_EFFECTS)), np.cumsum(np.array(energy).T, axis=0)])
-
-    def of(self, choice: Sequence[Window]) -> float:
-        """Return how much these windows tell each effect: mean logarithm of the energy."""
-        total = np.zeros(len(_EFFECTS))
-        for window in choice:
-            ends = np.clip(np.array([window.compared, window.end]) / _SAMPLE_S, 0,
-                           len(self._until) - 1).astype(int)
-            total += self._until[ends[1]] - self._until[ends[0]]
-        return float(np.mean(np.log1p(total)))
+def _energy(recording: FieldRecording, drive: Drive, bias: Bias) -> FloatArray:
+    """Return the energy of the responses to m effects up to n samples, shape (n + 1, m) [1]."""
+    samples = np.arange(0.0, min(recording.end, SOUGHT_S), _SAMPLE_S)
+    plan = schedule(recording.command, bias, samples, Longest(_STEP_S))
+    plain = batch.run(record_of(drive), plan)
+    noise = SensorModel.of(recording.sheet.sensors).noise(
+        plain[:, :, 0], plain[:, :, 1], 0.01 * recording.period)
+    energy = np.zeros((samples.size + 1, len(_EFFECTS)))
+    for i, effect in enumerate(_EFFECTS):
+        record = record_of(drive)
+        for path, factor in effect.items():
+            record.view(np.float64)[place_of(record.dtype, path)] *= factor
+        response = (batch.run(record, plan)[:, :, 0] - plain[:, :, 0]) / noise
+        response = np.clip(np.compress(_COMPARED, response, axis=1), -_MOST, _MOST)
+        energy[1:, i] = np.sum(np.nan_to_num(response) ** 2, axis=1)
+    return np.cumsum(energy, axis=0)
 
 
-def _scaled(record: Record, effect: Mapping[str, float]) -> Record:
-    """Return a drive's record with numbers multiplied by factors."""
-    numbers = record.view(np.float64).copy()
-    for path, factor in effect.items():
-        numbers[place_of(record.dtype, path)] *= factor
-    return numbers.view(record.dtype)
+def _worth(energy: FloatArray, choice: Sequence[Window]) -> float:
+    """Return the mean logarithm of the energy of each effect in windows, less what they cost."""
+    total, cost = np.zeros(len(_EFFECTS)), 0.0
+    for window in choice:
+        first, last = np.clip(np.array([window.compared, window.end]) / _SAMPLE_S, 0,
+                              len(energy) - 1).astype(int)
+        total += energy[last] - energy[first]
+        cost += (_COST_PER_S * (window.compared - window.begin)
+                 + (0.0 if window.known_start else _UNKNOWN_COST))
+    return float(np.mean(np.log1p(total))) - cost

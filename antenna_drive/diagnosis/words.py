@@ -6,16 +6,14 @@ The catalogue in plain words: what is said of each effect's number, and what to 
 The words are in words.yaml. What a number is compared with is looked up in the drive's record.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cache, partial
 import math
 from pathlib import Path
+import re
 from typing import Any
 
-from antenna_drive.diagnosis.modifiers import AntennaParameter, SCALE, SET
+from antenna_drive.diagnosis.modifiers import AntennaParameter, Modifier, SCALE, SET
 from antenna_drive.parameters.records import place_of
 from antenna_drive.parameters.sets import Drive, values
 import numpy as np
@@ -24,41 +22,8 @@ from simgap.machine.machine import Words
 from simgap.verdict.spoken import number, quantity, with_interval
 import yaml
 
-# What a number is added to, where that is not the field that holds the addition.
-_ADDED_TO = {'armature.resistance_change': 'armature.resistance'}
 # A change above this share is said as a multiple.
 _MULTIPLE = 10.0
-
-
-@dataclass(frozen=True)
-class _Said:
-    """What is said of a number: above zero, below it ('' for the same), and what to do next."""
-
-    greater: str
-    smaller: str
-    configured: float | None  # what the number changes; None for nothing
-    unit: str  # of `configured`
-    how: str  # what the number does to it
-    then: tuple[str, ...]
-
-    def sized(self, item: Mapping[str, Any]) -> str:
-        """Return what is said with the size, beside the configured one if there is one."""
-        base, values = self.configured, [item['value'], *item['ci95']]
-        if base:
-            made = [base * (1.0 + v) if self.how == SCALE else v if self.how == SET else base + v
-                    for v in values]
-            change = made[0] / base - 1.0
-        else:
-            change = values[0]
-            made = [-v for v in values] if change < 0.0 and self.smaller else values
-        text = self.smaller if change < 0.0 and self.smaller else self.greater
-        if '{by}' in text and not base:
-            near, far = sorted(max(v * math.copysign(1.0, change), 0.0) for v in values[1:])
-            return text.replace('{by}', f'{ratio(change)} ({ratio(near, "")} to {ratio(far, "")})')
-        told = with_interval({'value': made[0], 'ci95': sorted(made[1:]),
-                              'unit': self.unit or item['unit']})
-        return (f'{text.replace("{by}", ratio(change))}: {told}'
-                + (f' instead of {number(base)}' if base else ''))
 
 
 @cache
@@ -84,42 +49,39 @@ def ratio(change: float, word: str = ' percent') -> str:
 
 def words(effects: Iterable[Effect], drive: Drive,
           record: np.ndarray[Any, np.dtype[Any]]) -> dict[str, Words]:
-    """
-    Return what people say of effects, by id.
-
-    effects : of the catalogue
-    drive : the configuration, which knows units
-    record : of the drive in a test, shape (1,), which has the configured numbers
-    """
+    """Return what people say of effects, by id; `record`, shape (1,), is that of a test."""
     units = {path: entry.unit for path, entry, _ in values(drive)}
-    found: dict[str, Words] = {}
-    for effect in effects:
-        sizes = {}
-        for item in (size for form in effect.forms for size in form.sizes):
-            assert isinstance(item, AntennaParameter)
-            name = item.name.removeprefix(f'{effect.id}.')
-            sizes[item.name] = _said(effect, name, item, units, record)
-        found[effect.id] = partial(_clause, effect, sizes)
-    return found
+    return {effect.id: partial(_clause, effect, units, record) for effect in effects}
 
 
-def _clause(effect: Effect, said: Mapping[str, _Said],
+def _clause(effect: Effect, units: Mapping[str, str], record: np.ndarray[Any, np.dtype[Any]],
             numbers: Mapping[str, Any]) -> tuple[str, Sequence[str]]:
     """Return what is said of an effect with some numbers, and its next steps."""
-    sizes = {name: item for name, item in numbers.items() if _bare(name) in said}
+    known = {size.name: size for form in effect.forms for size in form.sizes}
+    sizes = {name: item for name, item in numbers.items() if _bare(name) in known}
     name = max(sizes, key=lambda key: abs(sizes[key]['value']))
-    words, form = said[_bare(name)], effect.forms[0]
-    text = words.sized(_amplitude(list(sizes.values())) if form.is_wave else sizes[name])
+    size, form, table = known[_bare(name)], effect.forms[0], _table()
+    assert isinstance(size, AntennaParameter)
+    row = row_of(effect.component, effect.id.partition('.')[2],
+                 size.name.removeprefix(f'{effect.id}.'))
+    mode = size.name.rpartition('_')[2]
+    row = {key: text.format(
+        part=table['parts'].get(effect.component, effect.component.replace('_', ' ')),
+        mode=f'mode {mode}' if mode.isdigit() else 'all modes', by='{by}')
+        for key, text in row.items()}
+    text = _sized(row['greater'], row.get('smaller', ''), size.modifier.how,
+                  *_configured(size.modifier, units, record),
+                  _amplitude(list(sizes.values())) if form.is_wave else sizes[name])
     if form.is_wave:
         text += f', {name.partition("@")[2].partition("[")[0]} cycles a turn'
     else:
-        if form.is_course:
-            text = text.replace(': ', ': up to ', 1)
         text += ''.join(f', {key.rpartition(".")[2].replace("_", " ")} '
                         f'{quantity(item["value"], item["unit"])}' for key, item in numbers.items()
                         if key not in sizes and item['unit'] != '1')
-    return text + (f', where {name[name.index("[") + 1:-1]}' if name.endswith(']') else ''
-                   ), words.then
+    if name.endswith(']'):
+        text += f', where {name[name.index("[") + 1:-1]}'
+    return text, (f'inspect {row["inspect"]}', table['predict'],
+                  f'repeat {table["tests"].get(row["repeat"], row["repeat"])}')
 
 
 def _bare(name: str) -> str:
@@ -127,44 +89,52 @@ def _bare(name: str) -> str:
     return name.partition('@')[0].partition('[')[0]
 
 
+def _sized(greater: str, smaller: str, how: str, base: float | None, unit: str,
+           item: Mapping[str, Any]) -> str:
+    """
+    Return what is said with the size, beside the configured one if there is one.
+
+    greater, smaller : what is said of a number above zero and below it ('' for the same)
+    how : what the number does to the configured one
+    base, unit : the configured number, None for none, and its unit
+    item : the number as a verdict has it
+    """
+    values = [item['value'], *item['ci95']]
+    if base:
+        made = [base * (1.0 + v) if how == SCALE else v if how == SET else base + v
+                for v in values]
+        change = made[0] / base - 1.0
+    else:
+        change = values[0]
+        made = [-v for v in values] if change < 0.0 and smaller else values
+    text = smaller if change < 0.0 and smaller else greater
+    if '{by}' in text and not base:
+        near, far = sorted(max(v * math.copysign(1.0, change), 0.0) for v in values[1:])
+        return text.replace('{by}', f'{ratio(change)} ({ratio(near, "")} to {ratio(far, "")})')
+    told = with_interval({'value': made[0], 'ci95': sorted(made[1:]),
+                          'unit': unit or item['unit']})
+    return (f'{text.replace("{by}", ratio(change))}: {told}'
+            + (f' instead of {number(base)}' if base else ''))
+
+
 def _amplitude(parts: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Return the amplitude of a wave from its sine and cosine parts, with its interval."""
     size = math.hypot(*(part['value'] for part in parts))
     half = math.hypot(*(0.5 * (part['ci95'][1] - part['ci95'][0]) * part['value'] / size
                         for part in parts)) if size else 0.0
-    return {'value': size, 'ci95': [max(size - half, 0.0), size + half],
-            'unit': parts[0]['unit']}
+    return {'value': size, 'ci95': [max(size - half, 0.0), size + half], 'unit': parts[0]['unit']}
 
 
-def _said(effect: Effect, name: str, item: AntennaParameter, units: Mapping[str, str],
-          record: np.ndarray[Any, np.dtype[Any]]) -> _Said:
-    table, row = _table(), row_of(effect.component, effect.id.partition('.')[2], name)
-    number = name.rpartition('_')[2]
-    part = table['parts'].get(effect.component, effect.component.replace('_', ' '))
-    said = {'part': part, 'mode': f'mode {number}' if number.isdigit() else 'all modes',
-            'by': '{by}'}
-    fields = [_changed(path) for path in getattr(item.modifier, 'fields', ())]
-    base = _in_common(fields, record)
-    return _Said(row['greater'].format(**said), row.get('smaller', '').format(**said), base,
-                 units.get(_entry(fields[0]), '') if fields else '', item.modifier.how,
-                 (f'inspect {row["inspect"].format(**said)}', table['predict'],
-                  f'repeat {table["tests"].get(row["repeat"], row["repeat"])}'))
-
-
-def _changed(path: str) -> str:
-    unit, _, field = path.partition('.')
-    return f'{unit}.{_ADDED_TO.get(field, field)}'
-
-
-def _entry(path: str) -> str:
-    """Return the entry of the configuration that a field is, or is one of the list of."""
-    return path.rpartition('.')[0] if path.rpartition('.')[2].isdigit() else path
-
-
-def _in_common(fields: list[str], record: np.ndarray[Any, np.dtype[Any]]) -> float | None:
-    """Return the number that the first field and those of its name have; None if they differ."""
+def _configured(modifier: Modifier, units: Mapping[str, str],
+                record: np.ndarray[Any, np.dtype[Any]]) -> tuple[float | None, str]:
+    """Return the number that a modifier changes, None where several differ, and its unit."""
+    # what is added to a resistance has a field of its own
+    fields = [path.removesuffix('_change') for path in modifier.fields]
+    if not fields:
+        return None, ''
+    entries = [re.sub(r'\.\d+$', '', path) for path in fields]
     numbers = record.view(np.float64)
-    same = [path for path in fields
-            if _entry(path).rpartition('.')[2] == _entry(fields[0]).rpartition('.')[2]]
-    found = {float(numbers[place_of(record.dtype, path)]) for path in same}
-    return found.pop() if len(found) == 1 else None
+    found = {float(numbers[place_of(record.dtype, path)])
+             for path, entry in zip(fields, entries, strict=True)
+             if entry.rpartition('.')[2] == entries[0].rpartition('.')[2]}
+    return found.pop() if len(found) == 1 else None, units.get(entries[0], '')

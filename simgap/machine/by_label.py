@@ -223,4 +223,4 @@ class ByLabel(Machine):
 
 def can_be_split(form: Form) -> bool:
     """Return whether a form may have a size under each value of a label."""
-    return not form.is_course and all(p.experiment is None for p in form.parameters)
+    return all(p.experiment is None for p in form.parameters)

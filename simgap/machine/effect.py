@@ -48,14 +48,12 @@ class Form:
 
     parameters : those that are not shape parameters are zero where the effect is absent
     scanned : True if the form was chosen by a scan of many, such as the orders of a ripple
-    is_course : True for a course over time that is free at every moment, such as a gust
     is_wave : True if its two sizes are the sine and the cosine part of a wave
     """
 
     name: str
     parameters: tuple[Parameter, ...]
     scanned: bool = field(default=False, kw_only=True)
-    is_course: bool = field(default=False, kw_only=True)
     is_wave: bool = field(default=False, kw_only=True)
 
     @property

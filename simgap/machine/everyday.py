@@ -125,9 +125,8 @@ def _sizes(machine: Machine, form: Form) -> list[Parameter]:
     """Return the sizes of a form that have an everyday size which no nuisance stands for."""
     nuisances = machine.nuisances
     neutral = {p.name: 0.0 for p in nuisances}
-    return [] if form.is_course else [
-        p for p in form.sizes
-        if p.tolerance > 0.0 and nuisances.absorb(neutral, {p.name: p.step}) == neutral]
+    return [p for p in form.sizes
+            if p.tolerance > 0.0 and nuisances.absorb(neutral, {p.name: p.step}) == neutral]
 
 
 class _Everyday(Machine):

@@ -48,11 +48,6 @@ class Hypothesis:
         return {p.name for effect, form in self.items if effect in effects
                 for p in form.parameters}
 
-    @property
-    def has_course(self) -> bool:
-        """Return whether one of the effects is a course over time."""
-        return any(form.is_course for form in self.forms)
-
     def with_jacobian(self, problem: LeastSquares) -> Hypothesis:
         """Return the hypothesis with a Jacobian, taken where its fit ended if it has none."""
         if self.state.base_jacobian.size:

@@ -156,7 +156,7 @@ def _fitted(problem: LeastSquares, effects: Sequence[str], forms: Sequence[Form]
         dict(point), np.column_stack([state.jacobian[:, kept], columns]))
     found = problem.fit(start, iterations)
     # where an effect is there, its shape has derivatives, and its sizes have others
-    own = {p.name for form in forms if not form.is_course for p in form.parameters}
+    own = {p.name for form in forms for p in form.parameters}
     places = [j for j, p in enumerate(found.parameters) if p.name in own]
     if places:
         found = problem.fit(problem.with_columns(found, places, problem.jacobian(

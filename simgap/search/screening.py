@@ -36,8 +36,7 @@ def sensitivities(problem: LeastSquares, state: FitState,
         state.residual[problem.rows(k)].reshape(e.measured.shape) * e.noise * problem.scale
         for k, e in enumerate(problem.experiments)]
     forms = [(effect.id, form) for effect in machine.catalogue.values()
-             for form in machine.catalogue.forms(effect, problem.experiments, residuals)
-             if not form.is_course]
+             for form in machine.catalogue.forms(effect, problem.experiments, residuals)]
     return list(concurrently(
         lambda item: Sensitivity(item[0], item[1], jacobian_of_form(problem, state, item[1])),
         forms))
@@ -81,8 +80,6 @@ def screened(problem: LeastSquares, state: FitState, known: Sequence[Sensitivity
         form = item.form
         if same_effect(problem.machine.catalogue, item.effect, besides):
             continue
-        if besides and form.is_course:
-            continue  # a free course explains what any other effect leaves
         if any(p.name in names for p in form.parameters):
             continue  # another effect with the same numbers
         own = item.jacobian[:, [j for j, p in enumerate(form.parameters) if not p.is_shape]]

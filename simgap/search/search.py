@@ -114,7 +114,7 @@ class Search:
             price = evidence.price((*base.forms, item.form))
             if unpaid + options.hope * gain / evidence.temperature - price > top:
                 yield partial(moves.added, problem, base, item)
-        if scanning and not base.has_course and self._leaves_much(base):
+        if scanning and self._leaves_much(base):
             for item, sizes in scan(problem, base.state, self._sensitivities, base.effects):
                 yield partial(moves.added, problem, base, item, sizes)
 
@@ -123,8 +123,6 @@ class Search:
         problem, catalogue = self._problem, self._problem.machine.catalogue
         for effect, was in base.items:
             yield partial(moves.dropped, problem, base, effect)
-            if was.is_course:
-                continue
             rest = [other for other in base.effects if other != effect]
             for other in catalogue.relatives(effect):
                 if not same_effect(catalogue, other.id, rest):
@@ -176,8 +174,7 @@ class Search:
     def _led(self, hypothesis: Hypothesis) -> Hypothesis:
         """Go on with a fit, and past local minima where it leaves much."""
         found = moves.settled(self._problem, hypothesis, 1)
-        return (moves.led(self._problem, found)
-                if self._leaves_much(found) and not found.has_course else found)
+        return moves.led(self._problem, found) if self._leaves_much(found) else found
 
     def _leaves_much(self, hypothesis: Hypothesis) -> bool:
         """Return whether a fit leaves more than noise: all the time, or loud for a while."""

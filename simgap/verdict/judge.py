@@ -100,7 +100,7 @@ class Judge:
         gain = unaided.cost - found.cost
         reasons = {}
         for effect, form in self._best.items:
-            if form.is_course or any(p.experiment is not None for p in form.parameters):
+            if any(p.experiment is not None for p in form.parameters):
                 reasons[effect] = 'its numbers belong to one test alone'
             elif gain < price:
                 reasons[effect] = (f'the training data gain {max(gain, 0.0):.1f} by the effects, '

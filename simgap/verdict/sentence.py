@@ -113,7 +113,7 @@ def _doubts(verdict: Verdict) -> Iterator[str]:
     top, folds = verdict.which[0], verdict.how_far.get('folds', ())
     sizes = {p.name: p for effect in top.effects if effect in verdict.machine.catalogue
              for form in verdict.machine.catalogue[effect].forms
-             if not (form.is_course or form.is_wave) for p in form.sizes}
+             if not form.is_wave for p in form.sizes}
     for name, item in top.parameters.items():
         if name not in sizes:
             continue

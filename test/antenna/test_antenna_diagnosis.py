@@ -185,6 +185,6 @@ def test_values_are_told_as_people_read_them() -> None:
                        'torque = 0.25 N m (0.2 to 0.3)']
     assert value_lines({'axis.inertia.change': {**item, 'unit': '1'}}
                        ) == ['change = 0.25 (0.2 to 0.3)']
-    # a gust is a course of many numbers
-    (line,) = value_lines({f'axis.wind_gust.torque:0:{i}': item for i in range(60)})
+    # what has many numbers is summed up
+    (line,) = value_lines({f'motor_1.inertia.change[load={i}]': item for i in range(60)})
     assert line.startswith('60 numbers')

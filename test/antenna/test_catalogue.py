@@ -35,8 +35,8 @@ REQUIRED = {
         'bias_pot', 'fade_out_voltage', 'share_filter', 'filter_1_gain', 'filter_1_pole')),
     *(f'axis.{name}' for name in (
         'coulomb_friction', 'viscous_friction', 'stribeck_friction',
-        'position_dependent_friction', 'gravity_imbalance', 'wind_steady', 'wind_gust',
-        'inertia', 'mode_frequency', 'mode_damping', 'extra_mode', 'bull_gear_backlash')),
+        'position_dependent_friction', 'gravity_imbalance', 'wind_steady', 'inertia',
+        'mode_frequency', 'mode_damping', 'extra_mode', 'bull_gear_backlash')),
     *(f'tach_{m}.{name}' for m in (1, 2) for name in ('gain', 'offset', 'ripple')),
     *(f'current_{m}.{name}' for m in (1, 2) for name in ('gain', 'offset')),
     'encoder.quantisation', 'encoder.cyclic_error', 'encoder.offset', 'bias_voltage.gain',
@@ -98,10 +98,10 @@ def test_effect_knows_by_how_much_its_number_may_be_off_anyway(model: Any, name:
     assert found['motor_1.viscous_friction.flow_index'] == 0.0, 'a shape may be anything'
 
 
-def test_every_effect_but_a_gust_and_lost_bits_has_a_size_that_is_healthy(model: Any) -> None:
+def test_every_effect_but_lost_bits_has_a_size_that_is_healthy(model: Any) -> None:
     without = {effect.id for effect in model.catalogue.values()
                if not any(p.tolerance for form in effect.forms for p in form.sizes)}
-    assert without == {'axis.wind_gust', 'encoder.quantisation'}
+    assert without == {'encoder.quantisation'}
 
 
 @pytest.mark.parametrize('effect', [e for e in catalogue().values() if e.simpler],

@@ -123,13 +123,6 @@ def test_what_the_recorder_does_is_kept_beside_the_file(
     assert np.median(read[:, 0] - current) == pytest.approx(0.02, abs=1e-4)
 
 
-def test_a_gust_has_no_place_in_a_file(machine: AntennaMachine) -> None:
-    made = correct(load(), machine.records,
-                   hypothesis(machine, {'axis.wind_gust.torque:0:3': 2e4}))
-    assert made.unwritten == ('axis.wind_gust',)
-    assert 'wind' not in made.text.split('\n', 1)[1]
-
-
 def test_an_effect_that_differs_between_labels_has_no_place_in_a_file(
         machine: AntennaMachine) -> None:
     name = 'motor_1.torque_constant.change'

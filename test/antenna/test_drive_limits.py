@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from dataclasses import fields, replace
+from dataclasses import asdict, fields, replace
 import math
 from pathlib import Path
 from typing import Any
@@ -33,7 +33,7 @@ def test_a_file_of_limits_says_what_it_says_and_nothing_else(
     path = tmp_path_factory.mktemp('limits') / 'limits.yaml'
     path.write_text(yaml.safe_dump(entries))
     found, usual = read_limits(path, DRIVE), DriveLimits.of_drive(DRIVE)
-    assert found.as_data() == {**usual.as_data(), **entries}
+    assert asdict(found) == {**asdict(usual), **entries}
 
 
 @settings(max_examples=30, deadline=None)

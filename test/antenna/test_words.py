@@ -15,7 +15,7 @@ import pytest
 from simgap.verdict.record import Named
 from simgap.verdict.sentence import said
 
-EFFECTS = catalogue([5.0])
+EFFECTS = catalogue()
 DRIVE = load()
 WORDS = words(EFFECTS.values(), DRIVE, record_of(DRIVE))
 
@@ -81,9 +81,6 @@ def told(effect: str, parameters: dict[str, Any]) -> str:
         'motor_1.torque_ripple.cosine@12': number(-4.0, -4.1, -3.9, 'N m')}),
      'The torque of motor 1 varies with the angle of its rotor: 5 N m (4.9 to 5.1), 12 cycles a '
      'turn.'),
-    (told('axis.wind_gust', {f'axis.wind_gust.torque:0:{i}': number(
-        1e4 * i, 9e3 * i, 1.2e4 * i, 'N m') for i in range(12)}),
-     'Gusts act on the axis, with a torque: up to 1.1e5 N m (99000 to 1.32e5).'),
     (told('gearbox_2.stiffness', {
         'gearbox_2.stiffness.change[load=A]': number(-0.1, -0.2, 0.0),
         'gearbox_2.stiffness.change[load=B]': number(-0.5, -0.6, -0.4)}),
