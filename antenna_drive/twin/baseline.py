@@ -160,14 +160,10 @@ def regressors(time: FloatArray, course: FloatArray) -> FloatArray:
     course : the twin's readings there, that of the encoder behind its high-pass, shape (n, 6)
     """
     slopes = np.gradient(course, time, axis=0)
+    way = np.tanh(course[:, _RATE] / _STANDS)  # the direction, -1 to 1
     return np.column_stack([
-        np.ones(time.size), course, slopes, direction(course),
+        np.ones(time.size), course, slopes, way,
         np.gradient(slopes[:, _RATE], time), np.abs(course[:, _RATE])])
-
-
-def direction(course: FloatArray) -> FloatArray:
-    """Return the direction of motion, -1 to 1, shape (n,)."""
-    return np.asarray(np.tanh(course[:, _RATE] / _STANDS))
 
 
 def standardised(rows: FloatArray, centre: FloatArray, scale: FloatArray) -> FloatArray:
@@ -245,8 +241,3 @@ def standard_scores(baseline: SignalBaseline, found: FloatArray) -> FloatArray:
     """Return scores in deviations of the quiet record, shape (5,), NaN where they say nothing."""
     safe = np.where(baseline.deviation > 0.0, baseline.deviation, np.nan)
     return np.asarray((found - baseline.mean) / safe)
-
-
-def names_of_charts(signals: Sequence[str]) -> list[tuple[str, str]]:
-    """Return signal and score of each chart, in the order of the charts."""
-    return [(name, score) for name in signals for score in SCORES]
