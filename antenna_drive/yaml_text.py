@@ -21,3 +21,9 @@ def dump_yaml(tree: object, **options: Any) -> str:
     """Write plain data, in the order given, so that `parse_yaml` reads the same."""
     text: str = yaml.dump(tree, Dumper=_Dumper, sort_keys=False, **options)
     return text
+
+
+def yaml_float(value: float) -> str:
+    """Return a number as YAML 1.1 reads it, which wants a point in front of an exponent."""
+    text = repr(value)
+    return text if 'e' not in text or '.' in text else text.replace('e', '.0e')

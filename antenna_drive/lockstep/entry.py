@@ -76,16 +76,15 @@ def run_drive_unit(default_name: str, names: Sequence[str], args: Sequence[str] 
         unit.step(0, np.zeros((len(unit.inputs), 2)))
         return unit
 
-    return _run(default_name, make, args, fed_by_topic, description, wiring, read_sheet)
+    return _run(default_name, make, args, description, wiring, fed_by_topic, read_sheet)
 
 
-def run_unit(unit: Unit, args: Sequence[str] | None = None, wiring: str = '') -> int:
+def run_unit(unit: Unit, args: Sequence[str] | None = None) -> int:
     """
     Run a unit of your own in the place of one of the wiring; SIGINT or SIGTERM ends the process.
 
     unit : its name is the name of the unit that it stands in for
     args : command line without the program's name; None for the process's own
-    wiring : as for `run_drive_unit`
 
     Returns the exit code of a node that did not start: 2 wrong input, 3 no ROS 2; 0 after --help.
     """
@@ -103,7 +102,7 @@ def run_unit(unit: Unit, args: Sequence[str] | None = None, wiring: str = '') ->
         unit.tune(changes)
         return unit
 
-    return _run(unit.name, make, args, {}, type(unit).__doc__ or '', wiring)
+    return _run(unit.name, make, args, type(unit).__doc__ or '')
 
 
 def run_partner(args: Sequence[str] | None = None, description: str = '') -> int:
@@ -127,11 +126,11 @@ def run_partner(args: Sequence[str] | None = None, description: str = '') -> int
                                 f'{", ".join(wired.signals)}')
         return PartnerUnit(name, wired.outputs[name], reads)
 
-    return _run('partner', make, args, {}, description, '')
+    return _run('partner', make, args, description)
 
 
-def _run(default_name: str, make: MakeUnit, args: Sequence[str] | None,
-         fed_by_topic: Mapping[str, LimitOf], description: str, wiring: str,
+def _run(default_name: str, make: MakeUnit, args: Sequence[str] | None, description: str,
+         wiring: str = '', fed_by_topic: Mapping[str, LimitOf] = MappingProxyType({}),
          read_sheet: ReadSheet | None = None) -> int:
     ending = _Ending()
     end_with_starter()

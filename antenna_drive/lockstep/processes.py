@@ -17,6 +17,7 @@ from typing import IO
 from antenna_drive.emulator.wiring import find, TEST_SIGNAL
 from antenna_drive.lockstep.entry import choose_transport
 from antenna_drive.lockstep.placement import hasten, machine_is_idle
+from antenna_drive.yaml_text import yaml_float
 from simgap.command.programs import PARENT
 from simgap.errors import UserError
 
@@ -37,8 +38,8 @@ class DriveProcesses:
     """
 
     def __init__(self, parameters: Mapping[str, Mapping[str, Parameter]] | None = None, *,
-                 config: Sequence[str] = (), namespace: str = '', domain_id: int | None = None,
-                 order: Sequence[str] = (), wiring: str = '',
+                 config: Sequence[str] = (), namespace: str = '', order: Sequence[str] = (),
+                 wiring: str = '',
                  commands: Mapping[str, Sequence[str]] | None = None,
                  environment: Mapping[str, str] | None = None,
                  placed: bool | None = None) -> None:
@@ -48,7 +49,6 @@ class DriveProcesses:
         config, parameters : configuration files or sets of config/ for every node, and what to set
             on each node over them, by unit and parameter name
         namespace : of every node, '/east'; '' for none
-        domain_id : the ROS 2 domain; None for the one in the environment
         order : the units, in the order in which they are started; that of the wiring if empty
         wiring : module:NAME of the wiring, '' for the drive's own
         commands : commands to run in place of our own nodes, by unit
@@ -63,8 +63,6 @@ class DriveProcesses:
         self._namespace = namespace
         self._commands = dict(commands or {})
         self._environment = {**os.environ, **(environment or {}), PARENT: str(os.getpid())}
-        if domain_id is not None:
-            self._environment['ROS_DOMAIN_ID'] = str(domain_id)
         choose_transport(self._environment)
         self._unpaced = self._parameters.get(TEST_SIGNAL, {}).get('run.pace') == 0.0
         self._hurried = placed
@@ -155,10 +153,7 @@ class DriveProcesses:
 
 
 def _yaml(value: Parameter) -> str:
-    # JSON is YAML, but for the exponent of a float: YAML 1.1 wants a point in the mantissa
+    # JSON is YAML, but for floats
     if isinstance(value, (list, tuple)):
         return '[' + ', '.join(_yaml(item) for item in value) + ']'
-    if isinstance(value, float):
-        text = repr(value)
-        return text if 'e' not in text or '.' in text else text.replace('e', '.0e')
-    return json.dumps(value)
+    return yaml_float(value) if isinstance(value, float) else json.dumps(value)

@@ -14,10 +14,7 @@ class Serving:
     """
     Serves a node's subscriptions, services and timers until it is closed.
 
-    Whatever arrives may be wrong: a callback that fails is logged, and the next one
-    is served.
-
-    faults : how many callbacks have failed
+    Whatever arrives may be wrong: a callback that fails is logged, and the next one is served.
     """
 
     def __init__(self, node: Node) -> None:
