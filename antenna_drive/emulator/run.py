@@ -129,10 +129,6 @@ class Emulator:
                 if source not in self._columns:
                     raise ParameterError(f'{name}: no unit puts out its input {source}')
 
-    def rows_read(self, name: str) -> np.ndarray[Any, np.dtype[np.intp]]:
-        """Return the rows of `now` that a unit reads, in the order of its inputs."""
-        return self._inputs[name]
-
     def restart(self) -> None:
         """Return every unit to its initial state, at step 0; live changes stay in force."""
         self.k = 0

@@ -14,7 +14,7 @@ format exactly and equal stamps compare equal; `time_s` gives seconds for comput
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 import math
 from types import MappingProxyType
@@ -180,10 +180,6 @@ class Recording:
 
     # -- cutting ------------------------------------------------------------------------------
 
-    def select(self, names: Sequence[str]) -> Recording:
-        """Return these signals only, in this order; RecordingError if one is not there."""
-        return replace(self, channels={name: self[name] for name in names})
-
     def between(self, start_s: float = -math.inf, end_s: float = math.inf) -> Recording:
         """Return the samples of start_s <= t < end_s, with their time stamps."""
         low = -2**63 if start_s < -9.2e9 else nanoseconds(start_s)
@@ -195,14 +191,8 @@ class Recording:
                                 channel.values[first:last])
         return replace(self, channels=cut)
 
-    def shift_ns(self, offset_ns: int, names: Sequence[str] | None = None) -> Recording:
-        """
-        Return the recording with `offset_ns` added to the time stamps of `names`, or of all.
-
-        Raises RecordingError: there is no such signal.
-        """
-        moved = dict(self.channels)
-        for name in self.names if names is None else names:
-            channel = self[name]
-            moved[name] = Channel(channel.unit, channel.time_ns + offset_ns, channel.values)
-        return replace(self, channels=moved)
+    def shift_ns(self, offset_ns: int) -> Recording:
+        """Return the recording with `offset_ns` added to all time stamps."""
+        return replace(self, channels={
+            name: Channel(channel.unit, channel.time_ns + offset_ns, channel.values)
+            for name, channel in self.channels.items()})
