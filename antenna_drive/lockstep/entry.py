@@ -144,7 +144,7 @@ def _run(default_name: str, make: MakeUnit, args: Sequence[str] | None, descript
         sys.stderr.flush()
         os._exit(OK)
 
-    return run_program(default_name, _help(default_name, description), args, act)
+    return run_program(default_name, _help(default_name, description), act, args)
 
 
 class _Ending:

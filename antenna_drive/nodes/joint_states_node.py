@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The joints on ROS 2: frames of plant and motors in, sensor_msgs/JointState out."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from threading import Event
 import time

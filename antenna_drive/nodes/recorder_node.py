@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The recorder on ROS 2: frames and changes in, bags out."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from datetime import datetime
 import math

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The player of recordings on ROS 2: signals and rows out, at a pace."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from threading import Event
 import time

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The twin on ROS 2: the real drive's topics in; twin, residuals, verdict and diagnostics out."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from concurrent.futures import BrokenExecutor
 from contextlib import ExitStack
