@@ -8,8 +8,6 @@ verdict is kept as soon as it is there, with a digest of what it was made from. 
 for the same recordings, options and sources, and only for these.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager

@@ -7,8 +7,6 @@ Each part of the package is checked by use: a library is imported, the physics c
 message is sent and received.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Mapping
 import csv
 from dataclasses import dataclass

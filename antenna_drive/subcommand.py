@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """An antenna-drive command in a process of its own, with limits on its time and memory."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 import math
 import os

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Plain data written as YAML that is read back as it was."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from simgap.inputs.plain_yaml import IS_NUMBER

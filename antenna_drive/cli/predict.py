@@ -20,8 +20,6 @@ answer is no (exit code 1) if --config is farther off than --against: if the rat
 averaged over the signals as a geometric mean, is above 1.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import math
@@ -113,7 +111,7 @@ def _change(now: float, before: float) -> str:
     return f'{number(change)} times more' if change >= 1.0 else f'{100.0 * change:.0f} % more'
 
 
-def _recorder(path: Path) -> SensorReadings:
+def _recorder(path: Path) -> 'SensorReadings':
     from antenna_drive.diagnosis.prediction import recorder_errors
     try:
         content = json.loads(path.read_text(encoding='utf-8'))

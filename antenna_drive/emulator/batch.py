@@ -9,8 +9,6 @@ jump of the command, and is cut where a tooth meets or a rotor sticks. This is t
 diagnosis, which runs a test thousands of times with other parameters.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache
 from typing import Any

@@ -8,8 +8,6 @@ derivative of each signal, which the receiver extrapolates (first-order hold). A
 macro-step of `FINE_STEP` is the converged reference that longer ones are measured against.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any

@@ -7,8 +7,6 @@ A unit neither knows who steps it nor where its inputs come from. The emulator
 steps it in one process, a node steps it over ROS 2, and both get the same bits.
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import ClassVar

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The units of a wiring: their compiled physics behind the interface of `Unit`."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache

@@ -7,8 +7,6 @@ Signal names are 'unit/signal'. Currents are in article amperes, see docs/model.
 your own adds units with `Wiring.plus`, and names the result to the nodes as 'module:NAME'.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import fields, make_dataclass
 from functools import cached_property
@@ -36,7 +34,7 @@ class Wired(NamedTuple):
     node: str
     feeds: Mapping[str, str] = {}
 
-    def fed(self, **feeds: str) -> Wired:
+    def fed(self, **feeds: str) -> 'Wired':
         """Return the unit with these inputs fed by other signals."""
         return self._replace(feeds={**self.feeds, **feeds})
 
@@ -72,7 +70,7 @@ class Wiring:
                 if source not in self.signals:
                     raise UserError(f'{name}: no unit puts out its input {source}')
 
-    def plus(self, *configuration: Path, **units: Wired) -> Wiring:
+    def plus(self, *configuration: Path, **units: Wired) -> 'Wiring':
         """Return the wiring with units added, or wired differently, and files for them."""
         return Wiring({**self.units, **units}, (*self.configuration, *configuration))
 

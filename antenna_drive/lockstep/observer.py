@@ -9,8 +9,6 @@ guest: it joins a run where it is, at the earliest step that the nodes remember,
 long as it keeps within what they remember, the last thousand steps.
 """
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 import os
@@ -242,7 +240,7 @@ class Observer:
             self._serving.close()
         leave(self.node)
 
-    def __enter__(self) -> Observer:
+    def __enter__(self) -> 'Observer':
         """Return the observer."""
         return self
 

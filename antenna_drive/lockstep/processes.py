@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Start the drive's processes, watch over them, and end every one of them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 import json
 import os
@@ -136,7 +134,7 @@ class DriveProcesses:
                 codes[unit] = process.wait()
         return codes
 
-    def __enter__(self) -> DriveProcesses:
+    def __enter__(self) -> 'DriveProcesses':
         """Start all processes."""
         self.start()
         return self

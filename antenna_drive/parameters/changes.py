@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Changes of tuning parameters while the drive runs."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from simgap.inputs.schema import Entry, nearest, ParameterError, Value

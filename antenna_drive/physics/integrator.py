@@ -9,8 +9,6 @@ fourth order of the method, and a smooth dependence on every parameter, survive 
 stiction with steps of a millisecond.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

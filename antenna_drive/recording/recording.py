@@ -12,8 +12,6 @@ Time is kept in whole nanoseconds, as in ROS 2 and MCAP, so that stamps survive 
 format exactly and equal stamps compare equal; `time_s` gives seconds for computing.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 import math
@@ -122,7 +120,7 @@ class Recording:
 
     @classmethod
     def from_arrays(cls, time_s: ArrayLike, signals: Mapping[str, ArrayLike],
-                    units: Mapping[str, str] | None = None, **known: Any) -> Recording:
+                    units: Mapping[str, str] | None = None, **known: Any) -> 'Recording':
         """
         Make a recording of arrays that share one time axis, such as those of a run.
 
@@ -180,7 +178,7 @@ class Recording:
 
     # -- cutting ------------------------------------------------------------------------------
 
-    def between(self, start_s: float = -math.inf, end_s: float = math.inf) -> Recording:
+    def between(self, start_s: float = -math.inf, end_s: float = math.inf) -> 'Recording':
         """Return the samples of start_s <= t < end_s, with their time stamps."""
         low = -2**63 if start_s < -9.2e9 else nanoseconds(start_s)
         high = 2**63 - 1 if end_s > 9.2e9 else nanoseconds(end_s)
@@ -191,7 +189,7 @@ class Recording:
                                 channel.values[first:last])
         return replace(self, channels=cut)
 
-    def shift_ns(self, offset_ns: int) -> Recording:
+    def shift_ns(self, offset_ns: int) -> 'Recording':
         """Return the recording with `offset_ns` added to all time stamps."""
         return replace(self, channels={
             name: Channel(channel.unit, channel.time_ns + offset_ns, channel.values)

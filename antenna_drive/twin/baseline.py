@@ -22,8 +22,6 @@ variance one, in which a change shows:
    Biometrika 41 (1954) 403).
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 import math
@@ -97,7 +95,7 @@ class Baseline:
                     for name, item in self.signals.items()}}
 
     @classmethod
-    def of_plain(cls, data: Mapping[str, Any]) -> Baseline:
+    def of_plain(cls, data: Mapping[str, Any]) -> 'Baseline':
         """Return the baseline that `plain` gave; KeyError or TypeError if it is none."""
         signals = {}
         for name, item in data['signals'].items():
@@ -187,7 +185,7 @@ class SignalBlock:
         """Return the slope of the twin's signal, shape (n,)."""
         return np.asarray(self.rows[:, SLOPES + self.column])
 
-    def shifted(self, shift_s: float) -> SignalBlock:
+    def shifted(self, shift_s: float) -> 'SignalBlock':
         """Return the part beside a twin that is earlier by a time [s]."""
         return replace(self, residual=self.residual - shift_s * self.slope)
 

@@ -6,8 +6,6 @@ A batch of tasks and those who do it.
 A task is a function and its arguments; its result comes back as soon as it is there.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Executor, FIRST_COMPLETED, Future, wait
 from concurrent.futures.process import BrokenProcessPool
