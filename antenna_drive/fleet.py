@@ -164,19 +164,12 @@ def diagnosed(files: Mapping[str, bytes], recordings: Sequence[str],
     """
     Diagnose one machine in a process of its own.
 
-    Parameters
-    ----------
-    files
-        recordings, sheets and configurations, by path
-    recordings
-        which of them, or which folders of them, are the recordings
-    options
-        of the diagnosis; a configuration that is among `files` is taken from there
+    files : recordings, sheets and configurations, by path
+    recordings : which of them, or which folders of them, are the recordings
+    options : of the diagnosis; a configuration that is among `files` is taken from there
 
-    Returns
-    -------
-    the files VERDICT and PAGE, and CORRECTED if it is wanted; FAILURE alone if there is none
-
+    Returns the files VERDICT and PAGE, and CORRECTED if it is wanted; FAILURE alone if there is
+    none.
     """
     with _work_folder() as folder:
         for path, content in files.items():

@@ -163,17 +163,10 @@ class Emulator:
         """
         Advance by many macro-steps.
 
-        Parameters
-        ----------
-        count
-            macro-steps
-        every
-            keep the samples of the steps that this number divides
+        count : macro-steps
+        every : keep the samples of the steps that this number divides
 
-        Returns
-        -------
-        numbers of the kept steps, shape (n,), and their samples, shape (n, len(names), 2)
-
+        Returns numbers of the kept steps, shape (n,), and their samples, shape (n, len(names), 2).
         """
         blocks = [unit for unit in self.units.values() if isinstance(unit, BlockUnit)]
         sources = [unit for unit in self.units.values() if not unit.inputs]

@@ -26,8 +26,6 @@ class Unit(ABC):
     Subclass it to put a unit of your own in the place of one of ours: keep the name and
     the outputs of the unit that you replace, and choose any of the drive's signals as inputs.
 
-    Class attributes
-    ----------------
     inputs : names of the signals this unit reads, each as 'unit/signal'
     outputs : the signals that it puts out, in the order of the rows of `start` and `step`
     """
@@ -44,15 +42,9 @@ class Unit(ABC):
         """
         Return to the initial state and give the outputs at t = 0.
 
-        Parameters
-        ----------
-        step_s
-            length of one macro-step [s]
+        step_s : length of one macro-step [s]
 
-        Returns
-        -------
-        array of shape (len(outputs), 2): value and time derivative of each output
-
+        Returns an array of shape (len(outputs), 2): value and time derivative of each output.
         """
 
     @abstractmethod
@@ -60,18 +52,11 @@ class Unit(ABC):
         """
         Advance the state from t_k to t_k+1 and give the outputs at t_k+1.
 
-        Parameters
-        ----------
-        k
-            number of the macro-step; t_k = k * step_s
-        inputs
-            array of shape (len(inputs), 2), value and time derivative of each input
-            at t_k; between t_k and t_k+1 an input is value + derivative * (t - t_k)
+        k : number of the macro-step; t_k = k * step_s
+        inputs : array of shape (len(inputs), 2), value and time derivative of each input at t_k;
+            between t_k and t_k+1 an input is value + derivative * (t - t_k)
 
-        Returns
-        -------
-        array of shape (len(outputs), 2): value and time derivative of each output at t_k+1
-
+        Returns an array of shape (len(outputs), 2): value and derivative of each output at t_k+1.
         """
 
     def settings(self) -> Mapping[str, tuple[Entry, Value]]:

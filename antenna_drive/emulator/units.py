@@ -162,10 +162,7 @@ class SourceUnit(_DriveUnit):
         """
         Give the test signals at t_k+1 and the macro-steps after it, as `step` would.
 
-        Returns
-        -------
-        array of shape (count, 2, 2): value and derivative of each output at each step
-
+        Returns an array of shape (count, 2, 2): value and derivative of each output at each step.
         """
         self._next = k + count + 1
         return self._sample(k + 1, count)

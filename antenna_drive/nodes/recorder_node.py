@@ -39,22 +39,12 @@ _PATIENCE_S = 5.0
 
 def run(arguments: Sequence[str]) -> int:
     """
-    Record until SIGINT or SIGTERM.
+    Record until SIGINT or SIGTERM; the arguments are without the program's name.
 
-    Parameters
-    ----------
-    arguments
-        command line without the program's name
+    Returns 0 if everything was recorded, 1 if a bag could not be written, steps were lost, or two
+    nodes of one name took part.
 
-    Returns
-    -------
-    0 if everything was recorded, 1 if a bag could not be written, steps were lost, or two nodes
-    of one name took part
-
-    Raises
-    ------
-    UserError : wrong arguments, an existing target, a wrong test sheet
-
+    Raises UserError: wrong arguments, an existing target, a wrong test sheet.
     """
     with ros_node(NAME, arguments, 'out:=my_run', undeclared=False) as node:
         return _RecorderNode(node).spin()

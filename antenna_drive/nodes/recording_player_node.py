@@ -34,21 +34,10 @@ def run(path: str, arguments: Sequence[str]) -> int:
     """
     Play a recording once, or until SIGINT or SIGTERM.
 
-    Parameters
-    ----------
-    path
-        of the recording
-    arguments
-        ROS 2 arguments
+    path : of the recording
+    arguments : those of ROS 2
 
-    Returns
-    -------
-    0
-
-    Raises
-    ------
-    UserError : the recording cannot be read, or an argument is wrong
-
+    Returns 0. Raises UserError: the recording cannot be read, or an argument is wrong.
     """
     recording = read_recording(path)
     stop = stopped_by_signals()

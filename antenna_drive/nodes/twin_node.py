@@ -65,21 +65,9 @@ _SWITCHES = {'tune': True, 'verdict': False}
 
 def run(arguments: Sequence[str]) -> int:
     """
-    Watch until SIGINT or SIGTERM.
+    Watch until SIGINT or SIGTERM; return 0. The arguments are without the program's name.
 
-    Parameters
-    ----------
-    arguments
-        command line without the program's name
-
-    Returns
-    -------
-    0
-
-    Raises
-    ------
-    UserError : wrong arguments, map, sheet, configuration or quiet record
-
+    Raises UserError: wrong arguments, map, sheet, configuration or quiet record.
     """
     with ros_node(NAME, arguments, 'real:=/elevation') as node, ExitStack() as stack:
         return _TwinNode(node, stack).spin()

@@ -47,18 +47,11 @@ class Workers:
         through once every result that is there has been yielded. Of tasks that have ended
         together those that failed come last: who stops at an error has kept the rest.
 
-        Parameters
-        ----------
-        function
-            a function of a module
-        tasks
-            the arguments of each task; they are asked for when there is room for another
+        function : a function of a module
+        tasks : the arguments of each task; they are asked for when there is room for another
 
-        Yields
-        ------
-        number of the task, from 0, and a function that returns its result or raises what the
-        task raised; TaskLost if the task ended its worker
-
+        Yields the number of the task, from 0, and a function that returns its result or raises
+        what the task raised; TaskLost if the task ended its worker.
         """
         ahead = enumerate(tasks)
         running: dict[Future[Result], int] = {}
