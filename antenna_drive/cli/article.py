@@ -41,7 +41,6 @@ THROUGH_NODES = ('T3a', 'T3b', 'T4a', 'T4e')
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the command's arguments."""
     add_json_option(parser)
     parser.add_argument('--figures', metavar='DIR', type=Path,
                         help='write each figure to DIR as SVG, and figures.html with all of them')
@@ -53,7 +52,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Do what the arguments say; return the exit code."""
     run_one = _through_nodes(arguments.config) if arguments.through_nodes else None
     results = Results(with_circuits(*arguments.config), run=run_one)
     with Progress('experiments', 1.0) as shown:

@@ -29,7 +29,6 @@ COUNT = 2000
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the command's arguments."""
     parser.add_argument('targets', metavar='TARGETS',
                         help='free parameters and target figures: a file, or a name in '
                              'config/calibration/')
@@ -52,7 +51,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Do what the arguments say; return the exit code."""
     check_options(arguments, jobs=Entry('', 1, whole=True))
     also = [candidate for path in arguments.also for candidate in read_log(path)]
     problem = read_problem(_find(arguments.targets), [arguments.start])

@@ -33,7 +33,6 @@ if TYPE_CHECKING:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare what the command understands."""
     parser.add_argument('sheet', type=Path, nargs='?', metavar='SHEET',
                         help='filled sheet (.yaml); without it the command asks')
     parser.add_argument('--out', type=Path, default=Path('my_drive.yaml'), metavar='FILE',

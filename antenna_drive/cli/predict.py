@@ -37,7 +37,6 @@ if TYPE_CHECKING:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command."""
     parser.add_argument('recording', metavar='RECORDING',
                         help='a .csv with its test sheet beside it, or a bag (folder or .mcap)')
     parser.add_argument('--config', action='append', required=True, metavar='FILE',

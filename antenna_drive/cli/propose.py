@@ -35,7 +35,6 @@ if TYPE_CHECKING:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command."""
     add_proposal_options(parser)
     parser.add_argument('--limits', type=Path, metavar='FILE',
                         help='limits of the drive that no test may exceed (.yaml)')

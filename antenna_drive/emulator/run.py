@@ -91,7 +91,6 @@ class Emulator:
 
     def __init__(self, drive: Drive, step_s: float = MACRO_STEP,
                  replaced: Mapping[str, Unit] | None = None, wiring: Wiring = DRIVE) -> None:
-        """Build the units and start them."""
         if not 0.0 < step_s < np.inf:
             raise ParameterError(f'step_s: {step_s!r} given, allowed is a number above 0 s')
         replaced = dict(replaced or {})

@@ -202,7 +202,6 @@ class Obtained:
     """Reads the figures of each experiment once its run is long enough, and remembers the runs."""
 
     def __init__(self) -> None:
-        """Begin with no run."""
         self._seen = _Seen({})
         self._told: tuple[str, int] | None = None
         self._before = 0

@@ -42,7 +42,6 @@ class Delays:
     """
 
     def __init__(self) -> None:
-        """Begin with none."""
         self.counts = empty_counts()
 
     def clear(self) -> None:

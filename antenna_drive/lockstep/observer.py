@@ -241,9 +241,7 @@ class Observer:
         leave(self.node)
 
     def __enter__(self) -> 'Observer':
-        """Return the observer."""
         return self
 
     def __exit__(self, *error: object) -> None:
-        """Leave the drive."""
         self.close()

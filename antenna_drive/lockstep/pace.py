@@ -27,7 +27,6 @@ class Pace:
     """
 
     def __init__(self, factor: float, lead_s: float = 0.0) -> None:
-        """Set the pace."""
         self.factor = factor
         self.lead_s = lead_s
         self.delays = Delays()

@@ -135,12 +135,10 @@ class DriveProcesses:
         return codes
 
     def __enter__(self) -> 'DriveProcesses':
-        """Start all processes."""
         self.start()
         return self
 
     def __exit__(self, *error: object) -> None:
-        """End all processes."""
         self.close()
 
     def close(self) -> None:

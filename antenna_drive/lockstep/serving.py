@@ -18,7 +18,6 @@ class Serving:
     """
 
     def __init__(self, node: Node) -> None:
-        """Begin to serve."""
         self._log = node.get_logger()
         self._executor = SingleThreadedExecutor(context=node.context)
         self._executor.add_node(node)

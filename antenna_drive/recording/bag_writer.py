@@ -124,7 +124,6 @@ class BagWriter:
         return topics
 
     def __enter__(self) -> 'BagWriter':
-        """Return the writer."""
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *rest: object) -> None:

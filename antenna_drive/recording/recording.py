@@ -82,7 +82,6 @@ class Recording:
     __hash__ = None  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
-        """Check and freeze everything."""
         for name in self.channels:
             check_name(name)
         object.__setattr__(self, 'channels', MappingProxyType(
@@ -149,11 +148,9 @@ class Recording:
                                  f'{nearest(name, self.channels)}') from None
 
     def __contains__(self, name: object) -> bool:
-        """Tell whether the signal was recorded."""
         return name in self.channels
 
     def __iter__(self) -> Iterator[str]:
-        """Iterate over the names of the signals."""
         return iter(self.channels)
 
     @property

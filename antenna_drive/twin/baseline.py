@@ -117,7 +117,6 @@ class WashOut:
     """The high-pass of the encoder; it begins at rest at its first value."""
 
     def __init__(self) -> None:
-        """Begin."""
         self._last: float | None = None
         self._state = 0.0
 

@@ -33,7 +33,6 @@ class Workers:
     """
 
     def __init__(self, executor: Executor, count: int) -> None:
-        """Hand tasks to an executor."""
         self._executor = executor
         self._count = count
 
