@@ -205,22 +205,17 @@ def _release() -> tuple[str, Mapping[str, str]]:
 
 def _loopback() -> Finding:
     """Send a message through ROS 2 and take it again, in a context of its own."""
-    from antenna_drive.lockstep.entry import choose_transport
+    from antenna_drive.lockstep.entry import own_node
     from antenna_drive.lockstep.leaving import leave
-    from rclpy.context import Context
     from rclpy.executors import SingleThreadedExecutor
-    from rclpy.node import Node
     from std_msgs.msg import Float64
-    choose_transport(os.environ)
-    context = Context()
-    context.init(args=[])
+    node = own_node(f'doctor_{os.getpid()}')
     try:
-        node = Node(f'doctor_{os.getpid()}', context=context)
         got: list[float] = []
         topic = f'doctor_{os.getpid()}'
         publisher = node.create_publisher(Float64, topic, 1)
         node.create_subscription(Float64, topic, lambda message: got.append(message.data), 1)
-        executor = SingleThreadedExecutor(context=context)
+        executor = SingleThreadedExecutor(context=node.context)
         executor.add_node(node)
         began = time.monotonic()
         while not got and time.monotonic() - began < _LOOPBACK_S:
@@ -229,7 +224,7 @@ def _loopback() -> Finding:
         executor.shutdown()
         leave(node)
     finally:
-        context.try_shutdown()
+        node.context.try_shutdown()
     if got:
         return Finding('nodes', 'a message', OK,
                        f'sent and received in {time.monotonic() - began:.1f} s')

@@ -50,10 +50,6 @@ class Results:
             lambda experiment, drive: simulate(drive, experiment.duration, MACRO_STEP))
         self._runs: dict[str, Run] = {}
 
-    def experiment(self, name: str) -> DriveExperiment:
-        """Return an experiment; KeyError if there is none of that name."""
-        return self._known[name]
-
     def run(self, name: str) -> Run:
         """Return the run of an experiment; KeyError if there is none of that name."""
         if name not in self._runs:

@@ -58,7 +58,8 @@ def run(arguments: argparse.Namespace) -> int:
         found = rows(results, EXPERIMENTS,
                      lambda done, total: shown.update(done / total))
     if arguments.through_nodes:
-        found = [_marked(row) for row in found]
+        found = [replace(row, note=f'{row.note}; through five ROS 2 processes')
+                 if row.id.partition('.')[0] in THROUGH_NODES else row for row in found]
     disagreements = contradictions(results)
     if arguments.figures is not None:
         _draw(results, arguments.figures)
@@ -95,13 +96,6 @@ def _draw(results: Results, folder: Path) -> None:
     for name, content in files.items():
         with replaced(folder / name) as stream:
             stream.write(content)
-
-
-def _marked(row: Row) -> Row:
-    """Return the row with a note on the five processes if it comes from them."""
-    if row.id.partition('.')[0] not in THROUGH_NODES:
-        return row
-    return replace(row, note=f'{row.note}; through five ROS 2 processes')
 
 
 def _text(found: list[Row], disagreements: list[Contradiction]) -> str:

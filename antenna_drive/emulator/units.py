@@ -40,30 +40,25 @@ class _DriveUnit(Unit):
         self.outputs = wired.interface.outputs  # type: ignore[misc]
         # The set whose parameters go by their bare names; others carry theirs: 'filter_1.gain'.
         self._bare = wired.interface.bare
-        self._set = parameters
+        self.parameters = parameters  # in force
         self._record = record_of(parameters)
         self._step_s = 0.0
-
-    @property
-    def parameters(self) -> Any:
-        """Return the parameter set in force."""
-        return self._set
 
     def _path(self, name: str) -> str:
         """Return the dotted name of a setting in the parameter set."""
         head = name.partition('.')[0]
-        return name if not self._bare or hasattr(self._set, head) else f'{self._bare}.{name}'
+        return name if not self._bare or hasattr(self.parameters, head) else f'{self._bare}.{name}'
 
     def settings(self) -> Mapping[str, tuple[Entry, Value]]:
         """Return every parameter of this unit: its name, what may be said of it, its value."""
         prefix = f'{self._bare}.' if self._bare else ''
         return {name.removeprefix(prefix): (entry, value)
-                for name, entry, value in values(self._set)}
+                for name, entry, value in values(self.parameters)}
 
     def tune(self, changes: Mapping[str, Value]) -> None:
         """Change tuning parameters, all or none; see `Unit.tune`."""
-        self._set = self._changed(changes)
-        self._record[:] = record_of(self._set)
+        self.parameters = self._changed(changes)
+        self._record[:] = record_of(self.parameters)
 
     def check(self, changes: Mapping[str, Value]) -> None:
         """Raise ParameterError if `changes` cannot be applied; change nothing."""
@@ -72,7 +67,8 @@ class _DriveUnit(Unit):
     def _changed(self, changes: Mapping[str, Value]) -> Any:
         entries = {name: entry for name, (entry, _) in self.settings().items()}
         checked = check_changes(changes, entries)
-        return changed(self._set, {self._path(name): value for name, value in checked.items()})
+        return changed(self.parameters, {
+            self._path(name): value for name, value in checked.items()})
 
 
 class BlockUnit(_DriveUnit):
@@ -120,7 +116,7 @@ class SourceUnit(_DriveUnit):
     def __init__(self, name: str, wired: Wired, parameters: TestSignal) -> None:
         """Take the unit's place in the wiring, and its parameter set."""
         super().__init__(name, wired, parameters)
-        self._bits = _bits_for(self._set)
+        self._bits = _bits_for(self.parameters)
         self._origins = np.zeros(2)
         self._next = 0
 
@@ -144,7 +140,7 @@ class SourceUnit(_DriveUnit):
         anew at the step at which it takes effect.
         """
         super().tune(changes)
-        self._bits = _bits_for(self._set)
+        self._bits = _bits_for(self.parameters)
         for name in changes:
             part, _, key = self._path(name).partition('.')
             if part in ('rate', 'torque') and key not in self._SCALES:

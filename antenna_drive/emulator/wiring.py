@@ -110,7 +110,6 @@ DRIVE = Wiring({
 
 UNITS = tuple(DRIVE.units)
 OUTPUTS: dict[str, tuple[Signal, ...]] = DRIVE.outputs
-INPUTS = {name: unit.sources for name, unit in DRIVE.units.items()}
 
 
 def signal_names() -> tuple[str, ...]:

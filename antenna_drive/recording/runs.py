@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, TYPE_CHECKING
 
 from antenna_drive.emulator.wiring import UNITS
@@ -60,6 +61,4 @@ def record(emulator: Emulator, duration: float, **known: Any) -> Recording:
     """
     configuration = configuration_of(emulator.units)
     run = emulator.run(duration, known.pop('changes', None), known.pop('every', 1))
-    recording = from_run(run, **known)
-    return Recording(recording.channels, configuration, recording.changes, recording.sheet,
-                     recording.notes)
+    return replace(from_run(run, **known), configuration=configuration)
