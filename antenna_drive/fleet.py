@@ -146,8 +146,8 @@ def diagnose_fleet(machines: Sequence[FleetMachine], out: Path, options: FleetOp
         else:
             rows[machine.name] = row_of(machine, verdict)
     done(len(rows))
-    tasks = ((_files(machine, options), [_name(path) for path in machine.recordings], options)
-             for machine, _ in wanted)
+    tasks = ((_files(machine, options), [f'recordings/{path.name}' for path in machine.recordings],
+              options) for machine, _ in wanted)
     for number, result in workers.each(diagnosed, tasks):
         machine, key = wanted[number]
         try:
@@ -292,10 +292,6 @@ def _files(machine: FleetMachine, options: FleetOptions) -> Files:
     except OSError as error:
         raise UserError(f'{error.filename}: cannot be read, {error.strerror}') from error
     return files
-
-
-def _name(recording: Path) -> str:
-    return f'recordings/{recording.name}'
 
 
 def _shipped(config: str) -> str:

@@ -182,7 +182,9 @@ def _ros() -> Iterator[Finding]:
     from rclpy.utilities import get_rmw_implementation_identifier
     yield Finding('nodes', 'ROS 2', OK, f'{release}, {get_rmw_implementation_identifier()}')
     yield _loopback()
-    yield _discovery()
+    reach = os.environ.get('ROS_AUTOMATIC_DISCOVERY_RANGE') or 'as ROS 2 has it'
+    yield Finding('nodes', 'discovery', OK,
+                  f'domain {os.environ.get("ROS_DOMAIN_ID", "0")}, range {reach}')
     yield from _ros2_run()
     free = shutil.disk_usage('/dev/shm').free / 2**20 if Path('/dev/shm').is_dir() else None
     if free is not None and free < 64.0:
@@ -231,13 +233,6 @@ def _loopback() -> Finding:
     return Finding('nodes', 'a message', BROKEN, f'sent, not received within {_LOOPBACK_S:g} s',
                    'look at RMW_IMPLEMENTATION, ROS_DOMAIN_ID, the discovery variables and the '
                    'firewall of this machine')
-
-
-def _discovery() -> Finding:
-    domain = os.environ.get('ROS_DOMAIN_ID', '0')
-    reach = os.environ.get('ROS_AUTOMATIC_DISCOVERY_RANGE', '')
-    return Finding('nodes', 'discovery', OK,
-                   f'domain {domain}, range {reach or "as ROS 2 has it"}')
 
 
 def _ros2_run() -> Iterator[Finding]:

@@ -17,8 +17,7 @@ _Dumper.add_implicit_resolver(*IS_NUMBER)  # type: ignore[no-untyped-call]
 
 def dump_yaml(tree: object, **options: Any) -> str:
     """Write plain data, in the order given, so that `parse_yaml` reads the same."""
-    text: str = yaml.dump(tree, Dumper=_Dumper, sort_keys=False, **options)
-    return text
+    return yaml.dump(tree, Dumper=_Dumper, sort_keys=False, **options)
 
 
 def yaml_float(value: float) -> str:

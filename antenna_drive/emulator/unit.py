@@ -11,12 +11,27 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import ClassVar
 
-from antenna_drive.parameters.changes import check_changes
 from antenna_drive.physics.arrays import FloatArray
 from antenna_drive.physics.block import Signal
-from simgap.inputs.schema import Entry, Value
+from simgap.inputs.schema import Entry, nearest, ParameterError, Value
 
 __all__ = ['FloatArray', 'Signal', 'Unit']
+
+
+def check_changes(changes: Mapping[str, object], entries: Mapping[str, Entry]) -> dict[str, Value]:
+    """
+    Check a set of live changes, all or nothing.
+
+    Raises ParameterError if a key is unknown or no tuning parameter, or its value not allowed.
+    """
+    checked: dict[str, Value] = {}
+    for key, value in changes.items():
+        if key not in entries:
+            raise ParameterError(f'{key}: no such parameter{nearest(key, tuple(entries))}')
+        if not entries[key].live:
+            raise ParameterError(f'{key}: a physical constant, read-only while the drive runs')
+        checked[key] = entries[key].check(key, value)
+    return checked
 
 
 class Unit(ABC):

@@ -9,9 +9,8 @@ import math
 from typing import Any
 
 from antenna_drive.emulator.kernels import of_unit
-from antenna_drive.emulator.unit import FloatArray, Unit
+from antenna_drive.emulator.unit import check_changes, FloatArray, Unit
 from antenna_drive.emulator.wiring import DRIVE, Wired, Wiring
-from antenna_drive.parameters.changes import check_changes
 from antenna_drive.parameters.loading import check_waveform
 from antenna_drive.parameters.records import record_of
 from antenna_drive.parameters.sets import changed, Drive, values
@@ -245,5 +244,4 @@ def build(name: str, drive: Drive, overrides: Mapping[str, Value] | None = None,
             unit._path(key): settings[key][0].check(key, value)
             for key, value in overrides.items()}))
         unit.check({})
-    result: Unit = unit
-    return result
+    return unit

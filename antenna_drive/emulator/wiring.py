@@ -49,6 +49,7 @@ class Wiring:
     Units, in the order of their signals in a sample, and what feeds them.
 
     units : by name; the name is that of the unit's node too
+    signals : as 'unit/signal', in that order
     configuration : files with the parameters of units that the reference set does not know
 
     Raises UserError: an input is fed by nothing, or by what no unit puts out.
@@ -110,11 +111,6 @@ DRIVE = Wiring({
 
 UNITS = tuple(DRIVE.units)
 OUTPUTS: dict[str, tuple[Signal, ...]] = DRIVE.outputs
-
-
-def signal_names() -> tuple[str, ...]:
-    """Return every signal of the drive as 'unit/signal', unit by unit in the order of UNITS."""
-    return DRIVE.signals
 
 
 def find(name: str) -> Wiring:

@@ -205,8 +205,7 @@ class DriveLink:
         result = await ask(
             self._clients[unit, 'set_parameters_atomically'], SetParametersAtomically.Request(
                 parameters=[_message(name, value) for name, value in values.items()]), unit)
-        reason: str = result.result.reason
-        return '' if result.result.successful else reason or 'refused'
+        return '' if result.result.successful else result.result.reason or 'refused'
 
     async def trigger(self, service: str) -> tuple[bool, str]:
         """

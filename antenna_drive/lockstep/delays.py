@@ -64,8 +64,7 @@ class Delays:
             return []
         wanted = np.ceil(np.array(PERCENTILES) / 100.0 * totals[-1])
         places = np.searchsorted(totals, wanted)
-        ends: list[float] = (_SHORTEST_S * 2.0 ** (places / _PER_OCTAVE)).tolist()
-        return ends
+        return (_SHORTEST_S * 2.0 ** (places / _PER_OCTAVE)).tolist()
 
     def values(self, what: str) -> list[tuple[str, str]]:
         """Return what /diagnostics says of them; `what` takes so long."""

@@ -202,8 +202,7 @@ class Exchange:
     @property
     def stamps(self) -> FloatArray:
         """Return when each of the first steps was made, on the clock of time.monotonic() [s]."""
-        stamps: FloatArray = self._s.stamps
-        return stamps
+        return self._s.stamps
 
     @property
     def step(self) -> int:

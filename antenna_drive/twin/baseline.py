@@ -232,9 +232,3 @@ def block_scores(baseline: SignalBaseline, part: SignalBlock) -> tuple[FloatArra
     left = part.left(baseline)
     return scores(left / baseline.sigma, own[:, 1 + part.column],
                   own[:, SLOPES + part.column], part.rows[:, WAY]), left
-
-
-def standard_scores(baseline: SignalBaseline, found: FloatArray) -> FloatArray:
-    """Return scores in deviations of the quiet record, shape (5,), NaN where they say nothing."""
-    safe = np.where(baseline.deviation > 0.0, baseline.deviation, np.nan)
-    return np.asarray((found - baseline.mean) / safe)

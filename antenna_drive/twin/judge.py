@@ -11,7 +11,7 @@ from antenna_drive.readings import SIGNALS
 from antenna_drive.recording.recording import unit_of
 from antenna_drive.twin.baseline import (
     Baseline, BLOCK_S, block_scores, DRIFT_S, ENCODER, interpolated, motion_of, regressors,
-    residual_of, SCORES, shift_of, SignalBlock, standard_scores, TWO_SIDED, WashOut,
+    residual_of, SCORES, shift_of, SignalBlock, TWO_SIDED, WashOut,
 )
 from antenna_drive.twin.cusum import Charts, limit_of_rate
 import numpy as np
@@ -183,7 +183,8 @@ class BlockJudge:
                 continue
             found, left = block_scores(item, there[name].shifted(shift))
             sizes[name] = float(np.sqrt(np.mean(left**2)))
-            z.append(standard_scores(item, found))
+            # in deviations of the quiet record, NaN where a score says nothing
+            z.append((found - item.mean) / np.where(item.deviation > 0.0, item.deviation, np.nan))
         if begin < run_in:
             return
         self.blocks += 1
