@@ -10,6 +10,7 @@ message is sent and received.
 from collections.abc import Callable, Iterable, Iterator, Mapping
 import csv
 from dataclasses import dataclass
+from functools import partial
 import importlib
 from importlib import metadata
 import math
@@ -72,11 +73,9 @@ def _machine() -> Iterator[Finding]:
         yield Finding('machine', 'antenna-drive', OK, f'{__version__}, {program}')
 
 
-def _libraries(part: str, *modules: str) -> Callable[[], Iterator[Finding]]:
-    def check() -> Iterator[Finding]:
-        for module in modules:
-            yield _library(part, module, _bounds())
-    return check
+def _libraries(part: str, *modules: str) -> Iterator[Finding]:
+    for module in modules:
+        yield _library(part, module, _bounds())
 
 
 def _library(part: str, module: str, bounds: Mapping[str, str]) -> Finding:
@@ -150,7 +149,7 @@ def _numbers(version: str) -> tuple[int, ...]:
 
 
 def _physics() -> Iterator[Finding]:
-    yield from _libraries('physics', 'numpy', 'scipy', 'numba', 'yaml', 'threadpoolctl')()
+    yield from _libraries('physics', 'numpy', 'scipy', 'numba', 'yaml', 'threadpoolctl')
     from antenna_drive.emulator.run import simulate
     from antenna_drive.parameters import load
     began = time.monotonic()
@@ -274,7 +273,7 @@ PARTS: dict[str, Callable[[], Iterator[Finding]]] = {
     'files': _files,
     'physics': _physics,
     'nodes': _ros,
-    **{part: _libraries(part, *modules) for part, modules in {
+    **{part: partial(_libraries, part, *modules) for part, modules in {
         'pages': ('jinja2',),
         'recording': ('mcap',),
         'bags': ('mcap', 'rosbags', 'mcap_protobuf'),

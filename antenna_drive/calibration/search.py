@@ -143,11 +143,8 @@ def search(problem: CalibrationProblem, count: int, *, seed: int = 1, log: Path 
 def _evaluators(problem: CalibrationProblem, jobs: int, scheduler: str | None) -> Iterator[
         Callable[[Sequence[Any], float], Iterator[FitCandidate]]]:
     """Yield a function that evaluates candidates and yields them in their order."""
-    def one_by_one(asked: Sequence[Any], limit: float) -> Iterator[FitCandidate]:
-        return (_evaluated(problem, shares, limit) for shares in asked)
-
     if jobs == 1 and scheduler is None:
-        yield one_by_one
+        yield lambda asked, limit: (_evaluated(problem, shares, limit) for shares in asked)
         return
     with workers(jobs, scheduler) as pool:
         def side_by_side(asked: Sequence[Any], limit: float) -> Iterator[FitCandidate]:

@@ -4,6 +4,7 @@
 
 from collections.abc import Iterable, Sequence
 from datetime import datetime
+from functools import partial
 import math
 from pathlib import Path
 import signal
@@ -96,14 +97,13 @@ class _RecorderNode:
         self._told_doubled: set[str] = set()
         self._ask_by = float('inf')
         for unit in OUTPUTS:
-            node.create_subscription(String, f'{unit}/changes', self._listener(unit), CHANGES_QOS)
+            node.create_subscription(String, f'{unit}/changes', partial(self._listen, unit),
+                                     CHANGES_QOS)
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, self._end)
 
-    def _listener(self, unit: str) -> Any:
-        def listen(message: String) -> None:
-            self._recorder.told(unit, read_record(message.data))
-        return listen
+    def _listen(self, unit: str, message: String) -> None:
+        self._recorder.told(unit, read_record(message.data))
 
     def _end(self, number: int, frame: FrameType | None) -> None:
         self._stop = True

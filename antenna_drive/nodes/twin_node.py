@@ -5,6 +5,7 @@
 from collections.abc import Sequence
 from concurrent.futures import BrokenExecutor
 from contextlib import ExitStack
+from functools import partial
 import json
 import os
 from pathlib import Path
@@ -133,7 +134,7 @@ class _TwinNode:
         for topic in topics.topics:
             self._node.create_subscription(
                 Float64MultiArray if topic.vector else Float64, topic.name,
-                self._listener(topic), _FROM_REAL)
+                partial(self._listen, topic), _FROM_REAL)
         names = {signal for topic in topics.topics for signal in topic.signals} - {RATE_COMMAND}
         self._publishers = {
             signal: [self._node.create_publisher(Float64, f'{name}/{middle}{signal}', _OUT)
@@ -146,11 +147,9 @@ class _TwinNode:
         self._node.create_subscription(Empty, f'{name}/begin_test',
                                        lambda message: self._tests.put(None), 1)
 
-    def _listener(self, topic: Topic) -> Any:
-        def listen(message: Any, info: Any) -> None:
-            numbers = tuple(message.data) if topic.vector else (message.data,)
-            self._arrived.put((topic, numbers, info['source_timestamp'], time.time_ns()))
-        return listen
+    def _listen(self, topic: Topic, message: Any, info: Any) -> None:
+        numbers = tuple(message.data) if topic.vector else (message.data,)
+        self._arrived.put((topic, numbers, info['source_timestamp'], time.time_ns()))
 
     def _propose(self, request: Any, response: Any) -> Any:
         """Answer who asks for the next test."""
