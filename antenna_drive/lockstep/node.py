@@ -154,14 +154,10 @@ class DriveNode:
                 raise Unusable('the unit is in plain Python')
             compile_ahead(self._unit)
             self._channel = RclChannel(self._node, self._link, self._readings)
-            self._report.exchange = Exchange(self._member, form, self._channel, self._stamps())
+            self._report.exchange = Exchange(self._member, form, self._channel)
         except (Unusable, NumbaError) as reason:
             self._node.get_logger().info(f'the exchange runs in Python: {one_line(reason)}')
         return self._report.exchange
-
-    def _stamps(self) -> int:
-        """Return of how many steps the compiled exchange notes the time; for a benchmark."""
-        return 0
 
     def _force(self, answer: Answer) -> None:
         """Put an answer of nobody in force, as a change."""
@@ -246,7 +242,7 @@ class DriveNode:
         exchange.pauses = sorted(self._pauses())
         reason = exchange.run(self._every, pace)
         if member.step != before:
-            self._made(exchange, before)
+            self._stepped()
         if reason in (compiled_loop.TAKE_FAILED, compiled_loop.PUBLISH_FAILED):
             self._give_up(exchange, reason)
         elif reason == compiled_loop.MISSING:
@@ -260,10 +256,6 @@ class DriveNode:
             yield self._partner.next_step()
         if self._services is not None:
             yield self._services.control.halt
-
-    def _made(self, exchange: Exchange, before: int) -> None:
-        """Do what is due after the steps that the compiled exchange has made since `before`."""
-        self._stepped()
 
     def _give_up(self, exchange: Exchange, reason: int) -> None:
         self._exchange = self._report.exchange = None
