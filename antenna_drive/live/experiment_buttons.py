@@ -132,12 +132,11 @@ def plan(name: str, settings: Mapping[str, Mapping[str, Any]],
     configuration : files that the experiment is built on, as in `DriveExperiment.drive`
     """
     result = ExperimentChanges({}, {})
-    for unit, (entry, value) in _wanted(experiments()[name].drive(*configuration)):
-        key, place = entry
+    for unit, key, entry, value in _wanted(experiments()[name].drive(*configuration)):
         now = settings.get(unit, {}).get(key)
         if now is None or _same(now, value):
             continue
-        if place.live:
+        if entry.live:
             result.live.setdefault(unit, {})[key] = value
         else:
             result.constants.setdefault(unit, []).append(key)
@@ -148,16 +147,16 @@ def start_of(experiment: DriveExperiment, configuration: tuple[str, ...],
              ) -> dict[str, dict[str, Value]]:
     """Return the parameters of nodes that differ from those of configuration and circuit."""
     plain = replace(experiment, settings={}, bias_share=None).drive(*configuration)
-    before = {(unit, key): value for unit, ((key, _), value) in _wanted(plain)}
+    before = {(unit, key): value for unit, key, _, value in _wanted(plain)}
     found: dict[str, dict[str, Value]] = {}
-    for unit, ((key, _), value) in _wanted(experiment.drive(*configuration)):
+    for unit, key, _, value in _wanted(experiment.drive(*configuration)):
         if not _same(before[unit, key], value):
             found.setdefault(unit, {})[key] = value
     return found
 
 
-def _wanted(drive: Drive) -> list[tuple[str, tuple[tuple[str, Entry], Value]]]:
-    return [(unit, ((key, entry), value)) for unit in UNITS
+def _wanted(drive: Drive) -> list[tuple[str, str, Entry, Value]]:
+    return [(unit, key, entry, value) for unit in UNITS
             for key, (entry, value) in build(unit, drive).settings().items()
             if key not in ('external', 'torque.external')]
 
