@@ -55,7 +55,7 @@ def config_files() -> list[tuple[str, list[str]]]:
 def nodes() -> dict[str, str]:
     """Return the module of each executable of nodes/."""
     modules = sorted(path.stem for path in Path(PACKAGE, 'nodes').glob('*.py')
-                     if '\ndef main(' in path.read_text())
+                     if '\nmain = ' in path.read_text())
     return {NAMES.get(module, module): module for module in modules}
 
 

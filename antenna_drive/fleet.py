@@ -8,8 +8,6 @@ verdict is kept as soon as it is there, with a digest of what it was made from. 
 for the same recordings, options and sources, and only for these.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -148,8 +146,8 @@ def diagnose_fleet(machines: Sequence[FleetMachine], out: Path, options: FleetOp
         else:
             rows[machine.name] = row_of(machine, verdict)
     done(len(rows))
-    tasks = ((_files(machine, options), [_name(path) for path in machine.recordings], options)
-             for machine, _ in wanted)
+    tasks = ((_files(machine, options), [f'recordings/{path.name}' for path in machine.recordings],
+              options) for machine, _ in wanted)
     for number, result in workers.each(diagnosed, tasks):
         machine, key = wanted[number]
         try:
@@ -166,19 +164,12 @@ def diagnosed(files: Mapping[str, bytes], recordings: Sequence[str],
     """
     Diagnose one machine in a process of its own.
 
-    Parameters
-    ----------
-    files
-        recordings, sheets and configurations, by path
-    recordings
-        which of them, or which folders of them, are the recordings
-    options
-        of the diagnosis; a configuration that is among `files` is taken from there
+    files : recordings, sheets and configurations, by path
+    recordings : which of them, or which folders of them, are the recordings
+    options : of the diagnosis; a configuration that is among `files` is taken from there
 
-    Returns
-    -------
-    the files VERDICT and PAGE, and CORRECTED if it is wanted; FAILURE alone if there is none
-
+    Returns the files VERDICT and PAGE, and CORRECTED if it is wanted; FAILURE alone if there is
+    none.
     """
     with _work_folder() as folder:
         for path, content in files.items():
@@ -301,10 +292,6 @@ def _files(machine: FleetMachine, options: FleetOptions) -> Files:
     except OSError as error:
         raise UserError(f'{error.filename}: cannot be read, {error.strerror}') from error
     return files
-
-
-def _name(recording: Path) -> str:
-    return f'recordings/{recording.name}'
 
 
 def _shipped(config: str) -> str:

@@ -7,11 +7,10 @@ Each part of the package is checked by use: a library is imported, the physics c
 message is sent and received.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Mapping
 import csv
 from dataclasses import dataclass
+from functools import partial
 import importlib
 from importlib import metadata
 import math
@@ -74,11 +73,9 @@ def _machine() -> Iterator[Finding]:
         yield Finding('machine', 'antenna-drive', OK, f'{__version__}, {program}')
 
 
-def _libraries(part: str, *modules: str) -> Callable[[], Iterator[Finding]]:
-    def check() -> Iterator[Finding]:
-        for module in modules:
-            yield _library(part, module, _bounds())
-    return check
+def _libraries(part: str, *modules: str) -> Iterator[Finding]:
+    for module in modules:
+        yield _library(part, module, _bounds())
 
 
 def _library(part: str, module: str, bounds: Mapping[str, str]) -> Finding:
@@ -152,7 +149,7 @@ def _numbers(version: str) -> tuple[int, ...]:
 
 
 def _physics() -> Iterator[Finding]:
-    yield from _libraries('physics', 'numpy', 'scipy', 'numba', 'yaml', 'threadpoolctl')()
+    yield from _libraries('physics', 'numpy', 'scipy', 'numba', 'yaml', 'threadpoolctl')
     from antenna_drive.emulator.run import simulate
     from antenna_drive.parameters import load
     began = time.monotonic()
@@ -184,7 +181,9 @@ def _ros() -> Iterator[Finding]:
     from rclpy.utilities import get_rmw_implementation_identifier
     yield Finding('nodes', 'ROS 2', OK, f'{release}, {get_rmw_implementation_identifier()}')
     yield _loopback()
-    yield _discovery()
+    reach = os.environ.get('ROS_AUTOMATIC_DISCOVERY_RANGE') or 'as ROS 2 has it'
+    yield Finding('nodes', 'discovery', OK,
+                  f'domain {os.environ.get("ROS_DOMAIN_ID", "0")}, range {reach}')
     yield from _ros2_run()
     free = shutil.disk_usage('/dev/shm').free / 2**20 if Path('/dev/shm').is_dir() else None
     if free is not None and free < 64.0:
@@ -207,22 +206,17 @@ def _release() -> tuple[str, Mapping[str, str]]:
 
 def _loopback() -> Finding:
     """Send a message through ROS 2 and take it again, in a context of its own."""
-    from antenna_drive.lockstep.entry import choose_transport
+    from antenna_drive.lockstep.entry import own_node
     from antenna_drive.lockstep.leaving import leave
-    from rclpy.context import Context
     from rclpy.executors import SingleThreadedExecutor
-    from rclpy.node import Node
     from std_msgs.msg import Float64
-    choose_transport(os.environ)
-    context = Context()
-    context.init(args=[])
+    node = own_node(f'doctor_{os.getpid()}')
     try:
-        node = Node(f'doctor_{os.getpid()}', context=context)
         got: list[float] = []
         topic = f'doctor_{os.getpid()}'
         publisher = node.create_publisher(Float64, topic, 1)
         node.create_subscription(Float64, topic, lambda message: got.append(message.data), 1)
-        executor = SingleThreadedExecutor(context=context)
+        executor = SingleThreadedExecutor(context=node.context)
         executor.add_node(node)
         began = time.monotonic()
         while not got and time.monotonic() - began < _LOOPBACK_S:
@@ -231,20 +225,13 @@ def _loopback() -> Finding:
         executor.shutdown()
         leave(node)
     finally:
-        context.try_shutdown()
+        node.context.try_shutdown()
     if got:
         return Finding('nodes', 'a message', OK,
                        f'sent and received in {time.monotonic() - began:.1f} s')
     return Finding('nodes', 'a message', BROKEN, f'sent, not received within {_LOOPBACK_S:g} s',
                    'look at RMW_IMPLEMENTATION, ROS_DOMAIN_ID, the discovery variables and the '
                    'firewall of this machine')
-
-
-def _discovery() -> Finding:
-    domain = os.environ.get('ROS_DOMAIN_ID', '0')
-    reach = os.environ.get('ROS_AUTOMATIC_DISCOVERY_RANGE', '')
-    return Finding('nodes', 'discovery', OK,
-                   f'domain {domain}, range {reach or "as ROS 2 has it"}')
 
 
 def _ros2_run() -> Iterator[Finding]:
@@ -286,7 +273,7 @@ PARTS: dict[str, Callable[[], Iterator[Finding]]] = {
     'files': _files,
     'physics': _physics,
     'nodes': _ros,
-    **{part: _libraries(part, *modules) for part, modules in {
+    **{part: partial(_libraries, part, *modules) for part, modules in {
         'pages': ('jinja2',),
         'recording': ('mcap',),
         'bags': ('mcap', 'rosbags', 'mcap_protobuf'),

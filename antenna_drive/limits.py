@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Limits on what a bag, a frame and a message of other programs may hold, see simgap's limits."""
 
-from __future__ import annotations
-
 from simgap.inputs.limits import Limit, LIMITS as INPUT_LIMITS
 
 BAG_RECORD = Limit('ANTENNA_DRIVE_MAX_BAG_RECORD', 64 * 2**20, 'bytes in one record of a bag')

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """How the programs of the drive begin, and how they end with the process that started them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 import os
 from pathlib import Path
@@ -13,8 +11,8 @@ import sys
 from simgap.command.programs import answered, OK, PARENT
 
 
-def run_program(name: str, description: str, args: Sequence[str] | None,
-                act: Callable[[list[str]], int]) -> int:
+def run_program(name: str, description: str, act: Callable[[list[str]], int],
+                args: Sequence[str] | None = None) -> int:
     """Run a program or print its help; return its exit code. The arguments exclude its name."""
     arguments = list(sys.argv[1:] if args is None else args)
 

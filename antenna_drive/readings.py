@@ -8,8 +8,6 @@ Columns of a CSV, entries of a test sheet, what a diagnosis and a twin compare, 
 and the columns of every array of readings follow from the table.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 import math

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a plain installation of the drive may lack, and how to get it."""
 
-from __future__ import annotations
-
 from antenna_drive.ros_releases import wheels
 from simgap.command.remedies import REMEDIES
 

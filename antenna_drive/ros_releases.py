@@ -8,8 +8,6 @@ suite has passed on it. setup.py makes an extra of each row, and scripts/set-up 
 file imports nothing, as setup.py runs it before anything is installed.
 """
 
-from __future__ import annotations
-
 # The wheels are for CPython 3.10 to 3.14 on x86-64 Linux, and for nothing else.
 WHEELS_EXIST = "sys_platform == 'linux' and platform_machine == 'x86_64'"
 

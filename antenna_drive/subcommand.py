@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """An antenna-drive command in a process of its own, with limits on its time and memory."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 import math
 import os
@@ -20,21 +18,12 @@ def run_command(words: Sequence[str], limit_s: float = math.inf, memory_MB: floa
 
     The process ends with this one.
 
-    Parameters
-    ----------
-    words
-        the command and its arguments
-    limit_s
-        time after which it is ended [s]
-    memory_MB
-        what it may ask for; if it asks for more, it fails (Linux)
-    program
-        the module that has the command
+    words : the command and its arguments
+    limit_s : time after which it is ended [s]
+    memory_MB : what it may ask for; if it asks for more, it fails (Linux)
+    program : the module that has the command
 
-    Returns
-    -------
-    its exit code and what it wrote to standard error, or that its time was up
-
+    Returns its exit code and what it wrote to standard error, or that its time was up.
     """
     with subprocess.Popen(
             [sys.executable, '-m', program, *words], stdin=subprocess.DEVNULL,

@@ -23,7 +23,7 @@ NOT_SOURCE = ('.*', '__pycache__', '*.egg-info', 'build', 'dist', 'install', 'lo
 # pytest would take a module that begins with test_ for tests
 NODES = sorted({'signal_generator': 'test_signal'}.get(path.stem, path.stem)
                for path in (ROOT / 'antenna_drive' / 'nodes').glob('*.py')
-               if 'def main(' in path.read_text(encoding='utf-8'))
+               if '\nmain = ' in path.read_text(encoding='utf-8'))
 # An interpreter of the ROS 2 wheels leaves this to its children, for whom it may be wrong.
 WHEELS_MARK = '_ROS_WHEELS_BOOTSTRAP_COMPLETE'
 

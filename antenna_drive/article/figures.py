@@ -49,8 +49,8 @@ def _new(rows: int = 1, height: float = 2.6, columns: int = 1, **shared: Any) ->
     return figure, figure.subplots(rows, columns, squeeze=False, **shared)
 
 
-def _one(height: float = 2.6) -> Any:
-    figure, axes = _new(height=height)
+def _one() -> Any:
+    figure, axes = _new()
     return figure, axes[0, 0]
 
 

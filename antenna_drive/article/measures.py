@@ -7,7 +7,7 @@ A `Readout` is taken from a weighted sum of one experiment's signals. A `Trend` 
 figures in order. A `ModelFigure` needs no run. `Results` runs each experiment only once.
 """
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 import math
@@ -46,12 +46,9 @@ class Results:
         """Store the parameters; nothing is run yet."""
         self.drives = drives
         self._known = known or article_experiments()
-        self._simulate = run or _in_one_process
+        self._simulate = run or (
+            lambda experiment, drive: simulate(drive, experiment.duration, MACRO_STEP))
         self._runs: dict[str, Run] = {}
-
-    def experiment(self, name: str) -> DriveExperiment:
-        """Return an experiment; KeyError if there is none of that name."""
-        return self._known[name]
 
     def run(self, name: str) -> Run:
         """Return the run of an experiment; KeyError if there is none of that name."""
@@ -62,14 +59,9 @@ class Results:
         return self._runs[name]
 
 
-def _in_one_process(experiment: DriveExperiment, drive: Drive) -> Run:
-    return simulate(drive, experiment.duration, MACRO_STEP)
-
-
-def with_circuits(*configuration: str, circuits: Iterable[str] = (OLD_CIRCUIT, NEW_CIRCUIT),
-                  ) -> dict[str, Drive]:
+def with_circuits(*configuration: str) -> dict[str, Drive]:
     """Return the drive of a configuration with each circuit of config/, by name."""
-    return {circuit: load(*configuration, circuit) for circuit in circuits}
+    return {circuit: load(*configuration, circuit) for circuit in (OLD_CIRCUIT, NEW_CIRCUIT)}
 
 
 def article_experiments() -> dict[str, DriveExperiment]:

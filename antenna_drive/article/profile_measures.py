@@ -28,13 +28,9 @@ def _dc_gain(share: TorqueShare) -> float:
     return share.k_2 / share.s_2
 
 
-def _with_dc_gain(share: TorqueShare, gain: float) -> TorqueShare:
-    return changed(share, {'k_2': gain * share.s_2})
-
-
 def _slope(share: TorqueShare, gain: float) -> float:
     """Return the slope between the corners of the profile at a DC gain g_2 [V/A]."""
-    text = _with_dc_gain(as_in_the_text(share), gain)
+    text = changed(as_in_the_text(share), {'k_2': gain * share.s_2})
     edges = corners(text)
     inner = np.linspace(edges.flat_A, edges.zero_A, 5)[1:-1]
     return float(np.polyfit(inner, static_profile.bias_voltage(text, inner), 1)[0])

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from antenna_drive.article.measures import article_measures, Measure, OLD_CIRCUIT, Results
+from antenna_drive.article.measures import article_measures, OLD_CIRCUIT, Results
 from antenna_drive.article.profile_measures import loaded_axis_measures, profile_measures
 from simgap.inputs.plain_yaml import read_yaml
 
@@ -80,12 +80,6 @@ class Row:
     note: str  # where it is in the article, and how it is evaluated
 
 
-def all_measures(results: Results) -> dict[str, Measure]:
-    """Return all figures that rows can refer to, by name."""
-    return {**article_measures(results.drives[OLD_CIRCUIT]), **profile_measures(),
-            **loaded_axis_measures()}
-
-
 def rows(results: Results, experiments: Iterable[str] = (),
          progress: Callable[[int, int], None] | None = None) -> list[Row]:
     """
@@ -98,7 +92,8 @@ def rows(results: Results, experiments: Iterable[str] = (),
     wanted = tuple(experiments)
     claims = [claim for claim in CLAIMS
               if not wanted or claim.measure.partition('.')[0] in wanted]
-    measures = all_measures(results)
+    measures = {**article_measures(results.drives[OLD_CIRCUIT]), **profile_measures(),
+                **loaded_axis_measures()}
     found = []
     for done, claim in enumerate(claims):
         if progress:

@@ -92,19 +92,14 @@ def _mean(time: FloatArray, value: FloatArray, after: float = 0.0) -> float:
     return float(value[time >= after][:-1].mean())
 
 
-def _largest_rise(values: Sequence[float]) -> float:
-    return float(np.diff(values).max())
-
-
 def falls(values: Sequence[float]) -> float:
     """Return the largest rise between neighbours: below zero if the figures fall strictly."""
-    return _largest_rise(values)
+    return float(np.diff(values).max())
 
 
 def falls_then_rises(values: Sequence[float]) -> float:
     """Return the largest step against 'falls, then rises', for the best turning point."""
-    return min(max(_largest_rise(values[:turn + 1]),
-                   _largest_rise([-value for value in values[turn:]]))
+    return min(max(falls(values[:turn + 1]), falls([-value for value in values[turn:]]))
                for turn in range(1, len(values) - 1))
 
 

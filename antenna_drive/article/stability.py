@@ -102,7 +102,9 @@ def bias_loop(drive: Drive, gain: float, pole: float, *, rotors_held: bool) -> F
     Returns a matrix of shape (4, 4) or (6, 6).
     """
     x_f, integral, demand, current, rate, angle = np.eye(6)
-    motor, amplifier = drive.motor_2, drive.motor_2.amplifier
+    motor, amplifier, armature = drive.motor_2, drive.motor_2.amplifier, drive.motor_2.armature
+    kappa = armature.physical_amperes_per_article_ampere
+    feedback = amplifier.current_feedback_gain
     difference_gain = drive.torque_share.filter_1.difference_gain
     error = amplifier.rate_gain * (amplifier.bias_command_gain * x_f
                                    - amplifier.tach_gain * rate)
@@ -110,20 +112,13 @@ def bias_loop(drive: Drive, gain: float, pole: float, *, rotors_held: bool) -> F
         -pole * x_f - gain * difference_gain * 2.0 * current,
         error / amplifier.integral_time,
         (error + integral - demand) / amplifier.lag,
-        _current_slope(drive, demand, current, rate),
+        ((armature.resistance + feedback) * (demand - current)
+         - armature.back_emf_constant / kappa * rate) / armature.inductance,
         (motor.motor.torque_constant * current - motor.gearbox.stiffness * angle
          - motor.gearbox.contact_damping * rate) / motor.motor.rotor_inertia,
         rate,
     ])
     return matrix[:4, :4] if rotors_held else matrix
-
-
-def _current_slope(drive: Drive, demand: FloatArray, current: FloatArray, rate: FloatArray,
-                   ) -> FloatArray:
-    armature, gain = drive.motor_2.armature, drive.motor_2.amplifier.current_feedback_gain
-    kappa = armature.physical_amperes_per_article_ampere
-    return np.asarray(((armature.resistance + gain) * (demand - current)
-                       - armature.back_emf_constant / kappa * rate) / armature.inductance)
 
 
 def growth(matrix: FloatArray) -> float:

@@ -9,7 +9,6 @@ tolerance: alone (conditional), or while all other parameters compensate for it 
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from itertools import count
 import math
 from typing import Any
@@ -39,14 +38,6 @@ _TRADE_OFF_POINTS = 12
 _HOPELESS = 30.0
 # Significant digits of a fitted number: more than any figure determines.
 _DIGITS = 7
-
-
-@dataclass(frozen=True)
-class _Local:
-    """The misses at the best candidate, and their slopes per share of the bounds."""
-
-    misses: FloatArray
-    slopes: FloatArray
 
 
 def report(problem: CalibrationProblem, found: SearchResult, trade_offs: Sequence[str] = (),
@@ -79,8 +70,8 @@ def report(problem: CalibrationProblem, found: SearchResult, trade_offs: Sequenc
             progress(next(done) / total)
         return evaluation
 
-    local = _slopes(problem, best, evaluated)
-    conditional, marginal, correlation, flat = _uncertainties(local)
+    slopes = _slopes(problem, best, evaluated)
+    conditional, marginal, correlation, flat = _uncertainties(slopes)
     return {
         'cost': best.evaluation.cost,
         'start_cost': found.candidates[0].evaluation.cost,
@@ -92,7 +83,7 @@ def report(problem: CalibrationProblem, found: SearchResult, trade_offs: Sequenc
              'marginal': _spread(item, share, marginal[i]),
              'determined': bool(marginal[i] <= _DETERMINED),
              'at_bound': bool(min(share, 1.0 - share) < 0.01),
-             'profile': _profile(item, i, best, local, evaluated)}
+             'profile': _profile(item, i, best, slopes, evaluated)}
             for i, (item, share) in enumerate(zip(problem.free, best.shares, strict=True))],
         **_common([item.name for item in problem.free], correlation, flat),
         'trade_offs': {figure: _trade_off(problem, (*found.candidates, *also), figure)
@@ -136,7 +127,8 @@ def _misses(problem: CalibrationProblem, figures: Any) -> FloatArray:
 
 
 def _slopes(problem: CalibrationProblem, best: FitCandidate,
-            evaluated: Callable[[FloatArray], Any]) -> _Local:
+            evaluated: Callable[[FloatArray], Any]) -> FloatArray:
+    """Return the slopes of the misses at the best candidate, per share of the bounds."""
     centre = np.array(best.shares)
     columns = []
     for i in range(centre.size):
@@ -147,15 +139,14 @@ def _slopes(problem: CalibrationProblem, best: FitCandidate,
             ends.append((shares[i], _misses(problem, evaluated(shares).figures)))
         (low, before), (high, after) = ends
         columns.append((after - before) / (high - low))
-    return _Local(_misses(problem, best.evaluation.figures), np.column_stack(columns))
+    return np.column_stack(columns)
 
 
-def _uncertainties(local: _Local) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+def _uncertainties(slopes: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Return conditional and marginal uncertainty, correlation, and the flat directions."""
-    _, strengths, directions = np.linalg.svd(local.slopes)
-    size = local.slopes.shape[1]
-    strengths = np.pad(strengths, (0, size - strengths.size))
-    norms = np.linalg.norm(local.slopes, axis=0)
+    _, strengths, directions = np.linalg.svd(slopes)
+    strengths = np.pad(strengths, (0, slopes.shape[1] - strengths.size))
+    norms = np.linalg.norm(slopes, axis=0)
     conditional = 1.0 / np.maximum(norms, 1.0)
     # only the bounds limit a direction that does not affect the targets
     variance = 1.0 / np.maximum(strengths, 1.0) ** 2
@@ -169,7 +160,7 @@ def _spread(item: Any, share: float, uncertainty: float) -> list[float]:
     return [item.at(share - uncertainty), item.at(share + uncertainty)]
 
 
-def _profile(item: Any, i: int, best: FitCandidate, local: _Local,
+def _profile(item: Any, i: int, best: FitCandidate, slopes: FloatArray,
              evaluated: Callable[[FloatArray], Any]) -> list[list[float]]:
     """
     Return cost against one parameter while the others compensate by the linear model.
@@ -178,14 +169,14 @@ def _profile(item: Any, i: int, best: FitCandidate, local: _Local,
     """
     points = [[item.at(best.shares[i]), best.evaluation.cost]]
     others = [j for j in range(len(best.shares)) if j != i]
-    slopes = local.slopes[:, others]
-    normal = slopes.T @ slopes + np.eye(len(others))
+    of_others = slopes[:, others]
+    normal = of_others.T @ of_others + np.eye(len(others))
     for offset in _PROFILE:
         share = best.shares[i] + offset
         if 0.0 <= share <= 1.0:
             shares = np.array(best.shares)
             shares[i] = share
-            shares[others] -= np.linalg.solve(normal, slopes.T @ (local.slopes[:, i] * offset))
+            shares[others] -= np.linalg.solve(normal, of_others.T @ (slopes[:, i] * offset))
             points.append([item.at(share), evaluated(np.clip(shares, 0.0, 1.0)).cost])
     return sorted(points)
 

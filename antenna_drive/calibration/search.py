@@ -62,12 +62,6 @@ def _begin_log(path: Path, problem: CalibrationProblem, seed: int) -> list[FitCa
     return candidates
 
 
-def _candidate(line: str) -> FitCandidate:
-    entry = json.loads(line)
-    return FitCandidate(tuple(entry['shares']),
-                        Evaluation(entry['cost'], entry['figures'], entry['complete']))
-
-
 def read_log(path: Path) -> list[FitCandidate]:
     """Return the candidates of any search's log; UserError if it is none."""
     return _read_log(path)[1]
@@ -80,7 +74,9 @@ def _read_log(path: Path) -> tuple[dict[str, Any], list[FitCandidate]]:
         head = json.loads(lines[0])
         if 'problem' not in head:
             raise KeyError('problem')
-        return head, [_candidate(line) for line in lines[1:] if line.endswith('\n')]
+        entries = (json.loads(line) for line in lines[1:] if line.endswith('\n'))
+        return head, [FitCandidate(tuple(entry['shares']), Evaluation(
+            entry['cost'], entry['figures'], entry['complete'])) for entry in entries]
     except OSError as error:
         raise UserError(f'{path}: cannot be read, {error.strerror}') from error
     except (ValueError, KeyError, TypeError, IndexError, RecursionError) as error:
@@ -147,11 +143,8 @@ def search(problem: CalibrationProblem, count: int, *, seed: int = 1, log: Path 
 def _evaluators(problem: CalibrationProblem, jobs: int, scheduler: str | None) -> Iterator[
         Callable[[Sequence[Any], float], Iterator[FitCandidate]]]:
     """Yield a function that evaluates candidates and yields them in their order."""
-    def one_by_one(asked: Sequence[Any], limit: float) -> Iterator[FitCandidate]:
-        return (_evaluated(problem, shares, limit) for shares in asked)
-
     if jobs == 1 and scheduler is None:
-        yield one_by_one
+        yield lambda asked, limit: (_evaluated(problem, shares, limit) for shares in asked)
         return
     with workers(jobs, scheduler) as pool:
         def side_by_side(asked: Sequence[Any], limit: float) -> Iterator[FitCandidate]:

@@ -17,7 +17,6 @@ _DEFAULT_STEPS = (5e-4, 1e-3, 2e-3, 4e-3)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options of the command."""
     parser.add_argument('--step', type=float, action='append', metavar='S',
                         help='macro-step [s]; must divide 4 ms; may be repeated '
                              '(default: 0.5, 1, 2 and 4 ms)')
@@ -25,7 +24,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Measure and print the table."""
     from antenna_drive.article.accuracy import distances
     from antenna_drive.article.experiments import experiments
     from antenna_drive.article.stability import simulated_limit

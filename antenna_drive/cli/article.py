@@ -18,8 +18,8 @@ or predicted. Currents are in the article's amperes. The exit code is 1 if a row
 
 import argparse
 from collections import Counter
-from collections.abc import Callable
 from dataclasses import asdict, replace
+from functools import partial
 from pathlib import Path
 
 from antenna_drive.article.contradictions import Contradiction, contradictions
@@ -41,7 +41,6 @@ THROUGH_NODES = ('T3a', 'T3b', 'T4a', 'T4e')
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the command's arguments."""
     add_json_option(parser)
     parser.add_argument('--figures', metavar='DIR', type=Path,
                         help='write each figure to DIR as SVG, and figures.html with all of them')
@@ -53,14 +52,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Do what the arguments say; return the exit code."""
-    run_one = _through_nodes(arguments.config) if arguments.through_nodes else None
-    results = Results(with_circuits(*arguments.config), run=run_one)
+    results = Results(with_circuits(*arguments.config), run=partial(
+        _through_nodes, arguments.config) if arguments.through_nodes else None)
     with Progress('experiments', 1.0) as shown:
         found = rows(results, EXPERIMENTS,
                      lambda done, total: shown.update(done / total))
     if arguments.through_nodes:
-        found = [_marked(row) for row in found]
+        found = [replace(row, note=f'{row.note}; through five ROS 2 processes')
+                 if row.id.partition('.')[0] in THROUGH_NODES else row for row in found]
     disagreements = contradictions(results)
     if arguments.figures is not None:
         _draw(results, arguments.figures)
@@ -71,21 +70,18 @@ def run(arguments: argparse.Namespace) -> int:
     return OK if all(row.passed for row in found) else NEGATIVE
 
 
-def _through_nodes(configuration: list[str]) -> Callable[[DriveExperiment, Drive], Run]:
-    """Return a runner that runs THROUGH_NODES in five processes and the others in this one."""
+def _through_nodes(configuration: list[str], experiment: DriveExperiment, drive: Drive) -> Run:
+    """Run one of THROUGH_NODES in five processes, and any other in this one."""
     from antenna_drive.lockstep.sampling import sample_processes
 
-    def run_one(experiment: DriveExperiment, drive: Drive) -> Run:
-        if experiment.name not in THROUGH_NODES:
-            return simulate(drive, experiment.duration)
-        steps = round(experiment.duration / MACRO_STEP)
-        with Progress(f'{experiment.name}, five processes', steps) as shown:
-            sampled = sample_processes(
-                steps, MACRO_STEP, name='article', settings=experiment.settings,
-                config=[*configuration, experiment.circuit], progress=shown.update)
-        return Run(MACRO_STEP, np.arange(steps + 1), sampled.names, sampled.samples)
-
-    return run_one
+    if experiment.name not in THROUGH_NODES:
+        return simulate(drive, experiment.duration)
+    steps = round(experiment.duration / MACRO_STEP)
+    with Progress(f'{experiment.name}, five processes', steps) as shown:
+        sampled = sample_processes(
+            steps, MACRO_STEP, name='article', settings=experiment.settings,
+            config=[*configuration, experiment.circuit], progress=shown.update)
+    return Run(MACRO_STEP, np.arange(steps + 1), sampled.names, sampled.samples)
 
 
 def _draw(results: Results, folder: Path) -> None:
@@ -97,13 +93,6 @@ def _draw(results: Results, folder: Path) -> None:
     for name, content in files.items():
         with replaced(folder / name) as stream:
             stream.write(content)
-
-
-def _marked(row: Row) -> Row:
-    """Return the row with a note on the five processes if it comes from them."""
-    if row.id.partition('.')[0] not in THROUGH_NODES:
-        return row
-    return replace(row, note=f'{row.note}; through five ROS 2 processes')
 
 
 def _text(found: list[Row], disagreements: list[Contradiction]) -> str:

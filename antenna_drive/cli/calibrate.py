@@ -29,7 +29,6 @@ COUNT = 2000
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the command's arguments."""
     parser.add_argument('targets', metavar='TARGETS',
                         help='free parameters and target figures: a file, or a name in '
                              'config/calibration/')
@@ -52,10 +51,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Do what the arguments say; return the exit code."""
     check_options(arguments, jobs=Entry('', 1, whole=True))
     also = [candidate for path in arguments.also for candidate in read_log(path)]
-    problem = read_problem(_find(arguments.targets), [arguments.start])
+    shipped = config_dir() / 'calibration' / f'{arguments.targets}.yaml'
+    by_name = shipped.is_file() and not Path(arguments.targets).exists()
+    problem = read_problem(shipped if by_name else arguments.targets, [arguments.start])
     with Progress('candidates', max(1, arguments.count)) as shown:
         found = search(problem, arguments.count, seed=arguments.seed, log=arguments.log,
                        progress=lambda done, best: shown.update(done),
@@ -66,12 +66,6 @@ def run(arguments: argparse.Namespace) -> int:
         fitted = report(problem, found, arguments.trade_off, shown.update, also)
     give(fitted, arguments.json, _text(fitted))
     return OK if all(item['met'] for item in fitted['targets']) else NEGATIVE
-
-
-def _find(targets: str) -> str | Path:
-    """Return the path given, or the file of that name in config/calibration/."""
-    shipped = config_dir() / 'calibration' / f'{targets}.yaml'
-    return shipped if not Path(targets).exists() and shipped.is_file() else targets
 
 
 def _text(fitted: dict[str, Any]) -> str:

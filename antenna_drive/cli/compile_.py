@@ -23,11 +23,12 @@ def run(args: argparse.Namespace) -> int:
     from antenna_drive.emulator.wiring import UNITS
     from antenna_drive.lockstep.exchange import compile_ahead
     from antenna_drive.parameters import load
+    import numpy as np
 
     with Progress('compiling', len(UNITS) + 1) as progress:
         emulator = Emulator(load())
-        for number, (name, unit) in enumerate(emulator.units.items()):
-            unit.step(0, emulator.now[emulator.rows_read(name)])
+        for number, unit in enumerate(emulator.units.values()):
+            unit.step(0, np.zeros((len(unit.inputs), 2)))
             compile_ahead(unit)
             progress.update(number + 1)
         emulator.restart()

@@ -20,7 +20,6 @@ FOLDERS = ('DIR', 'FOLDER', 'OUT', 'TRIAL')
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the argument of the command."""
     parser.add_argument('shell', choices=SHELLS, help='bash, zsh or tcsh')
 
 

@@ -19,8 +19,6 @@ two rates, and the bias at standstill. The exit code is 1 if one is off by more 
 docs/your-drive.md goes through an example.
 """
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 import sys
@@ -35,7 +33,6 @@ if TYPE_CHECKING:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare what the command understands."""
     parser.add_argument('sheet', type=Path, nargs='?', metavar='SHEET',
                         help='filled sheet (.yaml); without it the command asks')
     parser.add_argument('--out', type=Path, default=Path('my_drive.yaml'), metavar='FILE',
@@ -68,7 +65,7 @@ def run(args: argparse.Namespace) -> int:
     return OK if args.no_run else _compare(args.out, sheet)
 
 
-def _compare(path: Path, sheet: Sheet) -> int:
+def _compare(path: Path, sheet: 'Sheet') -> int:
     from antenna_drive.configuring.proof import checks
     from antenna_drive.parameters import load
 

@@ -25,7 +25,6 @@ from simgap.verdict import spoken
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command."""
     parser.add_argument('--excitation', nargs='+', metavar='TEST',
                         default=['square', 'triangle', 'multisine'],
                         help='test sheets, or square, triangle, multisine, chirp '

@@ -42,7 +42,6 @@ from simgap.inputs.schema import Entry
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command."""
     parser.add_argument('recordings', nargs='+', metavar='RECORDING',
                         help='recordings of one machine: .csv, bags (folder or .mcap), or with '
                              '--map any file that docs/recording.md lists')

@@ -39,7 +39,6 @@ from simgap.inputs.schema import Entry
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command."""
     parser.add_argument('folder', type=Path, metavar='FOLDER', help='folder with the recordings')
     parser.add_argument('--out', type=Path, metavar='OUT',
                         help='folder for the results (default: FOLDER/diagnosis)')

@@ -27,7 +27,6 @@ from simgap.errors import UserError
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command."""
     parser.add_argument('parts', nargs='*', metavar='PART',
                         help=f'what to examine: {", ".join(PARTS)} (default: all '
                              f'but {", ".join(CHECKOUT)})')
@@ -35,7 +34,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Examine the parts and say what was found."""
     for part in arguments.parts:
         if part not in PARTS:
             raise UserError(f'{part}: no such part; there are {", ".join(PARTS)}')

@@ -26,7 +26,6 @@ from simgap.errors import UserError
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare what the command understands."""
     add_recording_options(parser)
     parser.add_argument('out', type=Path, metavar='OUT.csv', help='the file to write; it must '
                                                                   'not be there yet')
@@ -40,7 +39,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Write the file and what goes beside it."""
     if args.real_amperes and args.field:
         raise UserError('--real-amperes: does not go with --field, whose columns are fixed')
     recording = read(args)

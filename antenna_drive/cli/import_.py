@@ -35,7 +35,6 @@ from simgap.logs.tables import kind_of
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare what the command understands."""
     parser.add_argument('csv', type=Path, metavar='FILE',
                         help='the file to read: a CSV, or with --map any that docs/recording.md '
                              'lists, such as .mat, .parquet or a bag of another machine')
@@ -45,7 +44,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Read the file, write the bag."""
     if not args.map and args.csv.exists() and kind_of(args.csv):
         raise UserError(f'{args.csv}: no CSV, which needs a map. {REMEDY}')
     with reading():

@@ -33,7 +33,6 @@ from simgap.errors import UserError
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command."""
     add_investigation_options(parser)
     parser.add_argument('--config', action='append', default=[], metavar='FILE',
                         help='configuration of the model; may be repeated')

@@ -35,7 +35,6 @@ _FOXGLOVE_PORT = 8765
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare what the command understands."""
     parser.add_argument('--join', action='store_true',
                         help='join a drive that runs, in place of starting one')
     parser.add_argument('--namespace', default='', metavar='NS',

@@ -18,7 +18,6 @@ _NAME = 'lockstep_check'
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options of the command."""
     parser.add_argument('--duration', type=float, default=5.0, metavar='S',
                         help='simulated time [s] (default: %(default)s)')
     parser.add_argument('--step', type=float, default=1e-3, metavar='S',

@@ -19,7 +19,6 @@ from simgap.command.output import replaced
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare what the command understands."""
     add_recording_options(parser)
     parser.add_argument('--signals', nargs='+', metavar='NAME',
                         help="the signals to draw, such as plant/encoder or 'motor_*/current'; "
@@ -29,7 +28,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Draw the picture."""
     out = args.out or Path(f'{Path(args.recording).resolve().stem}.png')
     form = picture_format(out)
     recording = read(args)

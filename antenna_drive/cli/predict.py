@@ -20,8 +20,6 @@ answer is no (exit code 1) if --config is farther off than --against: if the rat
 averaged over the signals as a geometric mean, is above 1.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import math
@@ -39,7 +37,6 @@ if TYPE_CHECKING:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command."""
     parser.add_argument('recording', metavar='RECORDING',
                         help='a .csv with its test sheet beside it, or a bag (folder or .mcap)')
     parser.add_argument('--config', action='append', required=True, metavar='FILE',
@@ -113,7 +110,7 @@ def _change(now: float, before: float) -> str:
     return f'{number(change)} times more' if change >= 1.0 else f'{100.0 * change:.0f} % more'
 
 
-def _recorder(path: Path) -> SensorReadings:
+def _recorder(path: Path) -> 'SensorReadings':
     from antenna_drive.diagnosis.prediction import recorder_errors
     try:
         content = json.loads(path.read_text(encoding='utf-8'))

@@ -23,8 +23,6 @@ configuration. With --model the machine is one of your own, and --out is a table
 The exit code is 1 if no test within the limits helps. docs/next-test.md has more.
 """
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 from typing import Any, TYPE_CHECKING
@@ -37,7 +35,6 @@ if TYPE_CHECKING:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command."""
     add_proposal_options(parser)
     parser.add_argument('--limits', type=Path, metavar='FILE',
                         help='limits of the drive that no test may exceed (.yaml)')
@@ -60,7 +57,7 @@ def run(arguments: argparse.Namespace) -> int:
     return proposed(arguments, lambda planning: tests_of(arguments.model, arguments.duration))
 
 
-def _tests_of_drive(arguments: argparse.Namespace, planning: dict[str, Any]) -> TestSpace:
+def _tests_of_drive(arguments: argparse.Namespace, planning: dict[str, Any]) -> 'TestSpace':
     from antenna_drive.diagnosis.allowed_tests import AntennaTests
     from antenna_drive.diagnosis.drive_limits import DriveLimits, read_limits
     from antenna_drive.diagnosis.planned_tests import BUILT_IN

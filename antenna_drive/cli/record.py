@@ -36,7 +36,6 @@ _NAME = 'recorder'
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare what the command understands."""
     parser.add_argument('--duration', type=float, required=True, metavar='S',
                         help='simulated time to record [s]')
     parser.add_argument('--out', type=Path, required=True, metavar='BAG',
@@ -58,7 +57,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Start, record, end."""
     check_options(args, duration=Entry('s', 1e-5, 1e9), step=Entry('s', 1e-5, 0.1))
     parameters = parse_settings(args.settings)
     sheet = load_sheet(args.play or args.sheet) if args.play or args.sheet else None

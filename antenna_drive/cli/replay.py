@@ -25,7 +25,6 @@ from simgap.inputs.schema import Entry
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare what the command understands."""
     add_recording_options(parser)
     add_config_option(parser)
     parser.add_argument('--out', type=Path, metavar='BAG',
@@ -38,7 +37,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Compute and write the twin."""
     check_options(args, step=Entry('s', 1e-5, 0.1), every=Entry('', 1, whole=True))
     source = Path(args.recording).resolve()
     out = args.out or source.with_name(f'{source.stem}_twin')

@@ -21,7 +21,6 @@ from simgap.command.output import add_json_option, replaced, write_json
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare what the command understands."""
     add_recording_options(parser)
     parser.add_argument('-o', '--out', type=Path, metavar='FILE',
                         help='the page; RECORDING.html here if not given')

@@ -19,7 +19,6 @@ from simgap.inputs.schema import Entry
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options of the command."""
     parser.add_argument('--duration', type=float, required=True, metavar='S',
                         help='simulated time [s]')
     parser.add_argument('--out', type=Path, required=True, metavar='FILE',
@@ -33,7 +32,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the drive and write what it did."""
     from antenna_drive.emulator.run import Emulator
     from antenna_drive.emulator.units import overridden
     from antenna_drive.parameters import load

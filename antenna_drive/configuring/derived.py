@@ -220,35 +220,24 @@ def _loops(sheet: Sheet, drive: Drive) -> Iterator[Number]:
 def _bias_gain(sheet: Sheet, drive: Drive, gain: float, difference: float,
                found: dict[str, float], current: float) -> Number:
     amplifier, armature = drive.motor_1.amplifier, drive.motor_1.armature
-    before = _Loop(2.0 * amplifier.bias_command_gain * amplifier.rate_gain
-                   * drive.torque_share.filter_1.difference_gain, amplifier.integral_time,
-                   amplifier.lag, armature.inductance / (
-                       armature.resistance + amplifier.current_feedback_gain), drive)
-    crossing = float(brentq(lambda omega: before.size(omega) - 1.0, 1e-3, 1e5))
-    after = before._replace(
-        gain=2.0 * gain * difference, integral_time=found['amplifier.integral_time'],
-        lag=found['amplifier.lag'], current_lag=sheet['motor.inductance'] / current)
-    return Number('amplifier', 'bias_command_gain', 1.0 / after.size(crossing),
+    filter_1 = drive.torque_share.filter_1
+
+    def size(omega: float, loop: float, integral_time: float, lag: float,
+             current_lag: float) -> float:
+        """Return how much the loop amplifies at a frequency [rad/s]; all times in s."""
+        s = 1j * omega
+        return abs(loop * (1.0 + 1.0 / (s * integral_time)) * filter_1.gain / (s + filter_1.pole)
+                   / (1.0 + s * lag) / (1.0 + s * current_lag))
+
+    before = (2.0 * amplifier.bias_command_gain * amplifier.rate_gain * filter_1.difference_gain,
+              amplifier.integral_time, amplifier.lag,
+              armature.inductance / (armature.resistance + amplifier.current_feedback_gain))
+    crossing = float(brentq(lambda omega: size(omega, *before) - 1.0, 1e-3, 1e5))
+    after = size(crossing, 2.0 * gain * difference, found['amplifier.integral_time'],
+                 found['amplifier.lag'], sheet['motor.inductance'] / current)
+    return Number('amplifier', 'bias_command_gain', 1.0 / after,
                   f'derived: the loop through Filter 1 crosses over at {crossing:.3g} rad/s with '
                   'held rotors, as in the reference')
-
-
-class _Loop(NamedTuple):
-    """The loop through Filter 1 with held rotors: gain, integral time, lags [s], Filter 1."""
-
-    gain: float
-    integral_time: float
-    lag: float
-    current_lag: float
-    drive: Drive
-
-    def size(self, omega: float) -> float:
-        """Return how much the loop amplifies at a frequency [rad/s]."""
-        s = 1j * omega
-        filter_1 = self.drive.torque_share.filter_1
-        return abs(self.gain * (1.0 + 1.0 / (s * self.integral_time))
-                   * filter_1.gain / (s + filter_1.pole)
-                   / (1.0 + s * self.lag) / (1.0 + s * self.current_lag))
 
 
 def locked_rotor_frequency(hub: float, inertias: FloatArray, frequencies: FloatArray,

@@ -13,6 +13,7 @@ from antenna_drive.configuring.derived import derived, kappa, Number, reference
 from antenna_drive.configuring.sheet import Sheet
 from antenna_drive.parameters.loading import PLACES, SECTIONS
 from antenna_drive.parameters.sets import Drive
+from antenna_drive.yaml_text import yaml_float
 from simgap.inputs.schema import Entry, ParameterError
 
 KEPT = 'kept: as in the reference drive'
@@ -55,7 +56,8 @@ def _entry(number: Number | None, section: str, item: Any, drive: Drive,
         entry.check(f'{section}.{item.name}', value)
     except ParameterError as error:
         raise ParameterError(f'{sheet.source}: {error}; it is {number.source}') from None
-    shown = (f'[{", ".join(map(_yaml, value))}]' if isinstance(value, list) else _yaml(value))
+    shown = (f'[{", ".join(map(yaml_float, value))}]' if isinstance(value, list)
+             else yaml_float(value))
     unit = f'"{entry.unit}"' if entry.unit == '1' else entry.unit
     yield f'  {item.name}: {{value: {shown}, unit: {unit},'
     source = f'source: "{number.source}"}}'
@@ -64,12 +66,3 @@ def _entry(number: Number | None, section: str, item: Any, drive: Drive,
 
 def _rounded(value: float) -> float:
     return float(f'{value:.6g}')
-
-
-def _yaml(value: float) -> str:
-    """Return a number as YAML reads it: an exponent needs a point and a sign."""
-    text = repr(value)
-    head, exponent, tail = text.partition('e')
-    if not exponent:
-        return text
-    return f'{head if "." in head else head + ".0"}e{tail if tail[0] in "+-" else "+" + tail}'

@@ -9,8 +9,6 @@ jump of the command, and is cut where a tooth meets or a rotor sticks. This is t
 diagnosis, which runs a test thousands of times with other parameters.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -124,26 +122,15 @@ def run(record: np.ndarray[Any, np.dtype[Any]], schedule: Schedule, wiring: Wiri
     """
     Run one variant of the drive through a test.
 
-    Parameters
-    ----------
-    record
-        of wiring.parameters, from `record_of`, shape (1,); left as it is
-    schedule
-        of the test
-    wiring
-        which units there are and what feeds them
-    channels
-        the outputs to be read, and states of units; by default the readings of a field test
+    record : of wiring.parameters, from `record_of`, shape (1,); left as it is
+    schedule : of the test
+    wiring : which units there are and what feeds them
+    channels : the outputs to be read, and states of units; by default the readings of a field test
 
-    Returns
-    -------
-    array of shape (rows, len(channels), 2): value and time derivative of each reading, SI units,
-    article amperes; of a state the value alone
+    Returns an array of shape (rows, len(channels), 2): value and time derivative of each reading,
+    SI units, article amperes; of a state the value alone.
 
-    Raises
-    ------
-    UserError : units feed each other in a loop without a state in it
-
+    Raises UserError: units feed each other in a loop without a state in it.
     """
     units = blocks(wiring)
     states = sum(block.count_states(record[0][name]) for name, block in units.items())

@@ -9,8 +9,6 @@ an equation of its own (`physics.block.Equation`). Blocks that feed each other i
 state in it cannot be ordered, and are refused.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Mapping, Sequence
 
 from antenna_drive.emulator.kernels import blocks

@@ -7,8 +7,6 @@ A unit's record goes in as an array of one: numba looks anew at a single record 
 which takes several times as long as the step itself.
 """
 
-from __future__ import annotations
-
 from functools import cache
 from pathlib import Path
 from typing import Any

@@ -8,8 +8,6 @@ derivative of each signal, which the receiver extrapolates (first-order hold). A
 macro-step of `FINE_STEP` is the converged reference that longer ones are measured against.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -93,7 +91,6 @@ class Emulator:
 
     def __init__(self, drive: Drive, step_s: float = MACRO_STEP,
                  replaced: Mapping[str, Unit] | None = None, wiring: Wiring = DRIVE) -> None:
-        """Build the units and start them."""
         if not 0.0 < step_s < np.inf:
             raise ParameterError(f'step_s: {step_s!r} given, allowed is a number above 0 s')
         replaced = dict(replaced or {})
@@ -128,10 +125,6 @@ class Emulator:
             for source in unit.inputs:
                 if source not in self._columns:
                     raise ParameterError(f'{name}: no unit puts out its input {source}')
-
-    def rows_read(self, name: str) -> np.ndarray[Any, np.dtype[np.intp]]:
-        """Return the rows of `now` that a unit reads, in the order of its inputs."""
-        return self._inputs[name]
 
     def restart(self) -> None:
         """Return every unit to its initial state, at step 0; live changes stay in force."""
@@ -169,17 +162,10 @@ class Emulator:
         """
         Advance by many macro-steps.
 
-        Parameters
-        ----------
-        count
-            macro-steps
-        every
-            keep the samples of the steps that this number divides
+        count : macro-steps
+        every : keep the samples of the steps that this number divides
 
-        Returns
-        -------
-        numbers of the kept steps, shape (n,), and their samples, shape (n, len(names), 2)
-
+        Returns numbers of the kept steps, shape (n,), and their samples, shape (n, len(names), 2).
         """
         blocks = [unit for unit in self.units.values() if isinstance(unit, BlockUnit)]
         sources = [unit for unit in self.units.values() if not unit.inputs]

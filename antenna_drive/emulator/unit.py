@@ -7,18 +7,31 @@ A unit neither knows who steps it nor where its inputs come from. The emulator
 steps it in one process, a node steps it over ROS 2, and both get the same bits.
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import ClassVar
 
-from antenna_drive.parameters.changes import check_changes
 from antenna_drive.physics.arrays import FloatArray
 from antenna_drive.physics.block import Signal
-from simgap.inputs.schema import Entry, Value
+from simgap.inputs.schema import Entry, nearest, ParameterError, Value
 
 __all__ = ['FloatArray', 'Signal', 'Unit']
+
+
+def check_changes(changes: Mapping[str, object], entries: Mapping[str, Entry]) -> dict[str, Value]:
+    """
+    Check a set of live changes, all or nothing.
+
+    Raises ParameterError if a key is unknown or no tuning parameter, or its value not allowed.
+    """
+    checked: dict[str, Value] = {}
+    for key, value in changes.items():
+        if key not in entries:
+            raise ParameterError(f'{key}: no such parameter{nearest(key, tuple(entries))}')
+        if not entries[key].live:
+            raise ParameterError(f'{key}: a physical constant, read-only while the drive runs')
+        checked[key] = entries[key].check(key, value)
+    return checked
 
 
 class Unit(ABC):
@@ -28,8 +41,6 @@ class Unit(ABC):
     Subclass it to put a unit of your own in the place of one of ours: keep the name and
     the outputs of the unit that you replace, and choose any of the drive's signals as inputs.
 
-    Class attributes
-    ----------------
     inputs : names of the signals this unit reads, each as 'unit/signal'
     outputs : the signals that it puts out, in the order of the rows of `start` and `step`
     """
@@ -46,15 +57,9 @@ class Unit(ABC):
         """
         Return to the initial state and give the outputs at t = 0.
 
-        Parameters
-        ----------
-        step_s
-            length of one macro-step [s]
+        step_s : length of one macro-step [s]
 
-        Returns
-        -------
-        array of shape (len(outputs), 2): value and time derivative of each output
-
+        Returns an array of shape (len(outputs), 2): value and time derivative of each output.
         """
 
     @abstractmethod
@@ -62,18 +67,11 @@ class Unit(ABC):
         """
         Advance the state from t_k to t_k+1 and give the outputs at t_k+1.
 
-        Parameters
-        ----------
-        k
-            number of the macro-step; t_k = k * step_s
-        inputs
-            array of shape (len(inputs), 2), value and time derivative of each input
-            at t_k; between t_k and t_k+1 an input is value + derivative * (t - t_k)
+        k : number of the macro-step; t_k = k * step_s
+        inputs : array of shape (len(inputs), 2), value and time derivative of each input at t_k;
+            between t_k and t_k+1 an input is value + derivative * (t - t_k)
 
-        Returns
-        -------
-        array of shape (len(outputs), 2): value and time derivative of each output at t_k+1
-
+        Returns an array of shape (len(outputs), 2): value and derivative of each output at t_k+1.
         """
 
     def settings(self) -> Mapping[str, tuple[Entry, Value]]:

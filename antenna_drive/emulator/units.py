@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The units of a wiring: their compiled physics behind the interface of `Unit`."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
@@ -11,9 +9,8 @@ import math
 from typing import Any
 
 from antenna_drive.emulator.kernels import of_unit
-from antenna_drive.emulator.unit import FloatArray, Unit
+from antenna_drive.emulator.unit import check_changes, FloatArray, Unit
 from antenna_drive.emulator.wiring import DRIVE, Wired, Wiring
-from antenna_drive.parameters.changes import check_changes
 from antenna_drive.parameters.loading import check_waveform
 from antenna_drive.parameters.records import record_of
 from antenna_drive.parameters.sets import changed, Drive, values
@@ -42,30 +39,25 @@ class _DriveUnit(Unit):
         self.outputs = wired.interface.outputs  # type: ignore[misc]
         # The set whose parameters go by their bare names; others carry theirs: 'filter_1.gain'.
         self._bare = wired.interface.bare
-        self._set = parameters
+        self.parameters = parameters  # in force
         self._record = record_of(parameters)
         self._step_s = 0.0
-
-    @property
-    def parameters(self) -> Any:
-        """Return the parameter set in force."""
-        return self._set
 
     def _path(self, name: str) -> str:
         """Return the dotted name of a setting in the parameter set."""
         head = name.partition('.')[0]
-        return name if not self._bare or hasattr(self._set, head) else f'{self._bare}.{name}'
+        return name if not self._bare or hasattr(self.parameters, head) else f'{self._bare}.{name}'
 
     def settings(self) -> Mapping[str, tuple[Entry, Value]]:
         """Return every parameter of this unit: its name, what may be said of it, its value."""
         prefix = f'{self._bare}.' if self._bare else ''
         return {name.removeprefix(prefix): (entry, value)
-                for name, entry, value in values(self._set)}
+                for name, entry, value in values(self.parameters)}
 
     def tune(self, changes: Mapping[str, Value]) -> None:
         """Change tuning parameters, all or none; see `Unit.tune`."""
-        self._set = self._changed(changes)
-        self._record[:] = record_of(self._set)
+        self.parameters = self._changed(changes)
+        self._record[:] = record_of(self.parameters)
 
     def check(self, changes: Mapping[str, Value]) -> None:
         """Raise ParameterError if `changes` cannot be applied; change nothing."""
@@ -74,7 +66,8 @@ class _DriveUnit(Unit):
     def _changed(self, changes: Mapping[str, Value]) -> Any:
         entries = {name: entry for name, (entry, _) in self.settings().items()}
         checked = check_changes(changes, entries)
-        return changed(self._set, {self._path(name): value for name, value in checked.items()})
+        return changed(self.parameters, {
+            self._path(name): value for name, value in checked.items()})
 
 
 class BlockUnit(_DriveUnit):
@@ -122,7 +115,7 @@ class SourceUnit(_DriveUnit):
     def __init__(self, name: str, wired: Wired, parameters: TestSignal) -> None:
         """Take the unit's place in the wiring, and its parameter set."""
         super().__init__(name, wired, parameters)
-        self._bits = _bits_for(self._set)
+        self._bits = _bits_for(self.parameters)
         self._origins = np.zeros(2)
         self._next = 0
 
@@ -146,7 +139,7 @@ class SourceUnit(_DriveUnit):
         anew at the step at which it takes effect.
         """
         super().tune(changes)
-        self._bits = _bits_for(self._set)
+        self._bits = _bits_for(self.parameters)
         for name in changes:
             part, _, key = self._path(name).partition('.')
             if part in ('rate', 'torque') and key not in self._SCALES:
@@ -164,10 +157,7 @@ class SourceUnit(_DriveUnit):
         """
         Give the test signals at t_k+1 and the macro-steps after it, as `step` would.
 
-        Returns
-        -------
-        array of shape (count, 2, 2): value and derivative of each output at each step
-
+        Returns an array of shape (count, 2, 2): value and derivative of each output at each step.
         """
         self._next = k + count + 1
         return self._sample(k + 1, count)
@@ -254,5 +244,4 @@ def build(name: str, drive: Drive, overrides: Mapping[str, Value] | None = None,
             unit._path(key): settings[key][0].check(key, value)
             for key, value in overrides.items()}))
         unit.check({})
-    result: Unit = unit
-    return result
+    return unit

@@ -7,8 +7,6 @@ Signal names are 'unit/signal'. Currents are in article amperes, see docs/model.
 your own adds units with `Wiring.plus`, and names the result to the nodes as 'module:NAME'.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import fields, make_dataclass
 from functools import cached_property
@@ -36,7 +34,7 @@ class Wired(NamedTuple):
     node: str
     feeds: Mapping[str, str] = {}
 
-    def fed(self, **feeds: str) -> Wired:
+    def fed(self, **feeds: str) -> 'Wired':
         """Return the unit with these inputs fed by other signals."""
         return self._replace(feeds={**self.feeds, **feeds})
 
@@ -51,6 +49,7 @@ class Wiring:
     Units, in the order of their signals in a sample, and what feeds them.
 
     units : by name; the name is that of the unit's node too
+    signals : as 'unit/signal', in that order
     configuration : files with the parameters of units that the reference set does not know
 
     Raises UserError: an input is fed by nothing, or by what no unit puts out.
@@ -72,7 +71,7 @@ class Wiring:
                 if source not in self.signals:
                     raise UserError(f'{name}: no unit puts out its input {source}')
 
-    def plus(self, *configuration: Path, **units: Wired) -> Wiring:
+    def plus(self, *configuration: Path, **units: Wired) -> 'Wiring':
         """Return the wiring with units added, or wired differently, and files for them."""
         return Wiring({**self.units, **units}, (*self.configuration, *configuration))
 
@@ -112,12 +111,6 @@ DRIVE = Wiring({
 
 UNITS = tuple(DRIVE.units)
 OUTPUTS: dict[str, tuple[Signal, ...]] = DRIVE.outputs
-INPUTS = {name: unit.sources for name, unit in DRIVE.units.items()}
-
-
-def signal_names() -> tuple[str, ...]:
-    """Return every signal of the drive as 'unit/signal', unit by unit in the order of UNITS."""
-    return DRIVE.signals
 
 
 def find(name: str) -> Wiring:

@@ -17,7 +17,6 @@ class Board:
     """
 
     def __init__(self) -> None:
-        """Begin with an empty board."""
         self._lock = Lock()
         self._count = 0
         self._notices: dict[str, tuple[int, str]] = {}

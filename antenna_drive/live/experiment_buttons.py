@@ -6,17 +6,18 @@ from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
 import math
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 from antenna_drive.article.experiments import DriveExperiment, experiments
-from antenna_drive.article.measures import article_measures, Measure, Results
+from antenna_drive.article.measures import article_measures, Measure
 from antenna_drive.article.published import Claim, CLAIMS
 from antenna_drive.emulator.run import Run
+from antenna_drive.emulator.unit import check_changes
 from antenna_drive.emulator.units import build
-from antenna_drive.emulator.wiring import signal_names, UNITS
+from antenna_drive.emulator.wiring import DRIVE, UNITS
 from antenna_drive.live.history import History, Piece
 from antenna_drive.parameters import load
-from antenna_drive.parameters.changes import check_changes
 from antenna_drive.parameters.loading import check_waveform
 from antenna_drive.parameters.records import record_of
 from antenna_drive.parameters.sets import Drive, entries
@@ -131,12 +132,11 @@ def plan(name: str, settings: Mapping[str, Mapping[str, Any]],
     configuration : files that the experiment is built on, as in `DriveExperiment.drive`
     """
     result = ExperimentChanges({}, {})
-    for unit, (entry, value) in _wanted(experiments()[name].drive(*configuration)):
-        key, place = entry
+    for unit, key, entry, value in _wanted(experiments()[name].drive(*configuration)):
         now = settings.get(unit, {}).get(key)
         if now is None or _same(now, value):
             continue
-        if place.live:
+        if entry.live:
             result.live.setdefault(unit, {})[key] = value
         else:
             result.constants.setdefault(unit, []).append(key)
@@ -147,16 +147,16 @@ def start_of(experiment: DriveExperiment, configuration: tuple[str, ...],
              ) -> dict[str, dict[str, Value]]:
     """Return the parameters of nodes that differ from those of configuration and circuit."""
     plain = replace(experiment, settings={}, bias_share=None).drive(*configuration)
-    before = {(unit, key): value for unit, ((key, _), value) in _wanted(plain)}
+    before = {(unit, key): value for unit, key, _, value in _wanted(plain)}
     found: dict[str, dict[str, Value]] = {}
-    for unit, ((key, _), value) in _wanted(experiment.drive(*configuration)):
+    for unit, key, _, value in _wanted(experiment.drive(*configuration)):
         if not _same(before[unit, key], value):
             found.setdefault(unit, {})[key] = value
     return found
 
 
-def _wanted(drive: Drive) -> list[tuple[str, tuple[tuple[str, Entry], Value]]]:
-    return [(unit, ((key, entry), value)) for unit in UNITS
+def _wanted(drive: Drive) -> list[tuple[str, str, Entry, Value]]:
+    return [(unit, key, entry, value) for unit in UNITS
             for key, (entry, value) in build(unit, drive).settings().items()
             if key not in ('external', 'torque.external')]
 
@@ -202,8 +202,7 @@ class Obtained:
     """Reads the figures of each experiment once its run is long enough, and remembers the runs."""
 
     def __init__(self) -> None:
-        """Begin with no run."""
-        self._seen = _Seen({})
+        self._runs: dict[str, Run] = {}
         self._told: tuple[str, int] | None = None
         self._before = 0
 
@@ -226,31 +225,21 @@ class Obtained:
         if piece.run != run or piece.time_s < experiment.duration:
             return None
         self._told = (name, run)
-        self._seen.runs.pop(name, None)
+        self._runs.pop(name, None)
         seen = run_of(piece, experiment)
         if seen is not None:
-            self._seen.runs[name] = seen
+            self._runs[name] = seen
         measures = article_measures(load())
         return {claim.measure: self._value(measures[claim.measure]) for claim in claims_of(name)}
 
     def _value(self, measure: Measure) -> float | None:
+        # the runs that were seen, in place of simulated ones
+        seen: Any = SimpleNamespace(drives={}, run=self._runs.__getitem__)
         try:
-            value = measure.value(self._seen)
+            value = measure.value(seen)
         except KeyError:
             return None
         return value if math.isfinite(value) else None
-
-
-class _Seen(Results):
-    """The runs that were seen, in place of simulated ones."""
-
-    def __init__(self, drives: dict[str, Drive]) -> None:
-        super().__init__(drives, {})
-        self.runs: dict[str, Run] = {}
-
-    def run(self, name: str) -> Run:
-        """Return a run; KeyError if it was not seen."""
-        return self.runs[name]
 
 
 def run_of(piece: Piece, experiment: DriveExperiment) -> Run | None:
@@ -262,5 +251,5 @@ def run_of(piece: Piece, experiment: DriveExperiment) -> Run | None:
     if piece.first or there.sum() < (1.0 - _MOST_MISSING) * wanted:
         return None
     steps = (np.flatnonzero(there) + 1) * per - 1
-    return Run(piece.step_s, steps, signal_names(), np.stack(
+    return Run(piece.step_s, steps, DRIVE.signals, np.stack(
         [ends[there], np.zeros_like(ends[there])], axis=2))

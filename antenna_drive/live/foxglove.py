@@ -16,7 +16,6 @@ from typing import Any
 from antenna_drive.emulator.unit import Signal
 from antenna_drive.emulator.wiring import OUTPUTS
 from antenna_drive.live.history import Piece
-from antenna_drive.live.own_processes import off_the_loop
 from antenna_drive.live.session import Session
 from foxglove import Channel, Context, Parameter, start_server, StatusLevel
 from foxglove.websocket import Capability, Client, ServerListener
@@ -62,7 +61,7 @@ class FoxgloveServer(ServerListener):
         """Listen no more, and close what is open."""
         self._sending.cancel()
         # a client may be waiting for what is done in this loop
-        return off_the_loop(self._server.stop)
+        return asyncio.to_thread(self._server.stop)
 
     # ---- what is told
 

@@ -23,7 +23,7 @@ from antenna_drive.live.history import History
 from antenna_drive.live.parameter_table import Description, table
 from antenna_drive.live.twins import Twins
 from antenna_drive.lockstep.changes import CHANGES, read_record, SETTINGS
-from antenna_drive.lockstep.entry import choose_transport
+from antenna_drive.lockstep.entry import own_node
 from antenna_drive.lockstep.frame import FrameLayout
 from antenna_drive.lockstep.leaving import leave
 from antenna_drive.lockstep.readings import CHANGES_QOS
@@ -35,8 +35,6 @@ from rcl_interfaces.msg import Parameter as ParameterMessage, ParameterEvent, Pa
 from rcl_interfaces.srv import (
     DescribeParameters, GetParameters, ListParameters, SetParametersAtomically,
 )
-from rclpy.context import Context
-from rclpy.node import Node
 from rclpy.parameter import Parameter
 from simgap.errors import UserError
 from std_msgs.msg import String
@@ -62,12 +60,9 @@ class DriveLink:
 
     def __init__(self, board: Board, namespace: str = '') -> None:
         """Join; the drive may come later. News goes to the board."""
-        choose_transport(os.environ)
         self._board = board
         self.namespace = '/' + namespace.strip('/') if namespace.strip('/') else ''
-        context = Context()
-        context.init(args=[])
-        self._node = Node(f'live_{os.getpid()}', namespace=self.namespace, context=context)
+        self._node = own_node(f'live_{os.getpid()}', self.namespace)
         self.history = History({unit: len(signals) for unit, signals in OUTPUTS.items()},
                                TEST_SIGNAL)
         self._frames = FrameLink(self._node, {
@@ -210,8 +205,7 @@ class DriveLink:
         result = await ask(
             self._clients[unit, 'set_parameters_atomically'], SetParametersAtomically.Request(
                 parameters=[_message(name, value) for name, value in values.items()]), unit)
-        reason: str = result.result.reason
-        return '' if result.result.successful else reason or 'refused'
+        return '' if result.result.successful else result.result.reason or 'refused'
 
     async def trigger(self, service: str) -> tuple[bool, str]:
         """

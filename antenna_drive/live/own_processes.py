@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The processes that the page may start: a drive of its own, and a recorder."""
 
-import asyncio
 from collections.abc import Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
@@ -138,8 +137,3 @@ class RecorderProcess:
                        if self.path is not None)
         except OSError:
             return 0
-
-
-async def off_the_loop(work: Any, *arguments: Any) -> Any:
-    """Do what takes a while in another thread."""
-    return await asyncio.get_running_loop().run_in_executor(None, work, *arguments)

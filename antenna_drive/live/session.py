@@ -12,14 +12,13 @@ from antenna_drive.emulator.wiring import OUTPUTS, TEST_SIGNAL
 from antenna_drive.live.board import Board
 from antenna_drive.live.experiment_buttons import listed, Obtained, plan, preview
 from antenna_drive.live.link import DriveLink
-from antenna_drive.live.own_processes import off_the_loop, OwnDrive, RecorderProcess
+from antenna_drive.live.own_processes import OwnDrive, RecorderProcess
 from antenna_drive.recording.files import read_recording
 from antenna_drive.recording.panels import PANELS
 from antenna_drive.recording.recording import Recording
 from antenna_drive.recording.sheet import parse_sheet
 from antenna_drive.recording.sheet_signal import settings_for, settings_of
 from simgap.errors import UserError
-from simgap.inputs.schema import ParameterError
 from simgap.logs.channel import NANOSECONDS
 from simgap.report.curves import kept
 
@@ -77,7 +76,7 @@ class Session:
 
     async def _look_at_experiment(self) -> None:
         name, history = self._playing, self.link.history
-        figures = await off_the_loop(self._obtained.look, name, history) if name else None
+        figures = await asyncio.to_thread(self._obtained.look, name, history) if name else None
         if figures is not None and name == self._playing:
             self.board.post('obtained', {'name': name, 'run': history.run, 'figures': figures})
 
@@ -111,7 +110,7 @@ class Session:
             self.board.post('nodes', {'nodes': self.link.nodes()})
             await self._look_at_experiment()
             if was_recording and not self._recorder.running:
-                await off_the_loop(self._recorder.stop)  # it has ended by itself
+                await asyncio.to_thread(self._recorder.stop)  # it has ended by itself
             if was_recording or self._recorder.running:
                 self._tell_recorder()
             was_recording = self._recorder.running
@@ -130,7 +129,7 @@ class Session:
         return await act(message)
 
     async def _set(self, message: Mapping[str, Any]) -> None:
-        refusal = await self.link.set(_text(message, 'unit'), _mapping(message, 'values'))
+        refusal = await self.link.set(_given(message, 'unit'), _given(message, 'values', dict))
         if refusal:
             raise UserError(refusal)
         if message['unit'] == TEST_SIGNAL and not all(
@@ -138,7 +137,7 @@ class Session:
             self._tell_experiment(None)  # what was published is of another test signal
 
     async def _run(self, message: Mapping[str, Any]) -> str:
-        service = _text(message, 'service')
+        service = _given(message, 'service')
         if service not in _RUN_SERVICES:
             raise UserError(f'{service}: no such service')
         if service == 'step' and 'steps' in message:
@@ -149,7 +148,7 @@ class Session:
         return said
 
     async def _experiment(self, message: Mapping[str, Any]) -> str:
-        name = _text(message, 'name')
+        name = _given(message, 'name')
         if name not in experiments():
             raise UserError(f'{name}: no such experiment')
         own, before = self._own, self.link.history.run
@@ -162,7 +161,7 @@ class Session:
         async with self._restarting:
             if found.constants and own is not None:
                 self._tables.clear()
-                await off_the_loop(own.stop)
+                await asyncio.to_thread(own.stop)
                 self.link.forget_reports()
                 own.start(name)
                 said = 'the drive is started again with the constants of this experiment'
@@ -178,21 +177,21 @@ class Session:
         span = message.get('span')
         if not isinstance(span, (int, float)) or not 0.0 < span <= _LONGEST_SPAN_S:
             raise UserError('span: allowed is a time up to 600 s')
-        return preview(_mapping(message, 'values'), float(span))
+        return preview(_given(message, 'values', dict), float(span))
 
     async def _play(self, message: Mapping[str, Any]) -> str:
         if 'twin' in message:
-            sheet = parse_sheet(self.link.twins.next_test(_text(message, 'twin')))
+            sheet = parse_sheet(self.link.twins.next_test(_given(message, 'twin')))
             settings = settings_for(sheet.waveform) if sheet.waveform else {}
         else:
-            path = Path(_text(message, 'path')).expanduser()
-            settings = await off_the_loop(settings_of, path)
+            path = Path(_given(message, 'path')).expanduser()
+            settings = await asyncio.to_thread(settings_of, path)
         await self._set({'unit': TEST_SIGNAL, 'values': settings})
         self._tell_experiment(None)
         return await self._run({'service': 'reset'})
 
     async def _twin(self, message: Mapping[str, Any]) -> str:
-        name, act = _text(message, 'name'), _text(message, 'act')
+        name, act = _given(message, 'name'), _given(message, 'act')
         if act == 'begin_test':
             self.link.twins.begin_test(name)
             return 'another test begins; the drive has to stand still now'
@@ -205,37 +204,29 @@ class Session:
             path = self._recorder.start(str(message.get('name') or ''))
             self._tell_recorder()
             return str(path)
-        await off_the_loop(self._recorder.stop)
+        await asyncio.to_thread(self._recorder.stop)
         self._tell_recorder()
         return self._recorder.said
 
     async def _recordings(self, message: Mapping[str, Any]) -> list[str]:
-        found: list[str] = await off_the_loop(recordings_in, self._recorder.folder)
-        return found
+        return await asyncio.to_thread(recordings_in, self._recorder.folder)
 
     async def _load(self, message: Mapping[str, Any]) -> Any:
-        path = Path(_text(message, 'path')).expanduser()
-        return await off_the_loop(lambda: thinned(read_recording(path, partial=True), path))
+        path = Path(_given(message, 'path')).expanduser()
+        return await asyncio.to_thread(lambda: thinned(read_recording(path, partial=True), path))
 
     async def close(self) -> None:
         """End what was started."""
-        await off_the_loop(self._recorder.stop)
+        await asyncio.to_thread(self._recorder.stop)
         if self._own is not None:
-            await off_the_loop(self._own.stop)
-        await off_the_loop(self.link.close)
+            await asyncio.to_thread(self._own.stop)
+        await asyncio.to_thread(self.link.close)
 
 
-def _text(message: Mapping[str, Any], key: str) -> str:
+def _given(message: Mapping[str, Any], key: str, kind: type = str) -> Any:
     value = message.get(key)
-    if not isinstance(value, str) or not value:
+    if not isinstance(value, kind) or not value:
         raise UserError(f'{key}: is missing')
-    return value
-
-
-def _mapping(message: Mapping[str, Any], key: str) -> dict[str, Any]:
-    value = message.get(key)
-    if not isinstance(value, dict) or not value:
-        raise ParameterError(f'{key}: is missing')
     return value
 
 

@@ -8,6 +8,7 @@ checked: anything may be on a topic.
 """
 
 from collections.abc import Mapping
+from functools import partial
 import json
 import math
 from typing import Any
@@ -55,17 +56,15 @@ class Twins:
         self._told[name] = {'name': name, 'reports': 0, 'verdict': None, 'next_test': None}
         for topic, read in (('verdict', verdict_of), ('next_test', next_test_of)):
             self._node.create_subscription(String, f'{name}/{topic}',
-                                           self._listener(name, topic, read), STATE_QOS)
+                                           partial(self._listen, name, topic, read), STATE_QOS)
         self._begins[name] = self._node.create_publisher(Empty, f'{name}/begin_test', 1)
         self._proposes[name] = self._node.create_client(Trigger, f'{name}/propose')
 
-    def _listener(self, name: str, topic: str, read: Any) -> Any:
-        def listen(message: String) -> None:
-            found = read(message.data)
-            if found is not None:
-                self._told[name][topic] = found
-                self._post(name)
-        return listen
+    def _listen(self, name: str, topic: str, read: Any, message: String) -> None:
+        found = read(message.data)
+        if found is not None:
+            self._told[name][topic] = found
+            self._post(name)
 
     def _post(self, name: str) -> None:
         self._board.post(f'twin {name}', self._told[name])

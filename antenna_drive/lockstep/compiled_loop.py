@@ -29,8 +29,6 @@ _HEADER, _SENDER = len(HEADER), SENDER
 
 # Why the loop returns.
 STEPPED, LIMIT, FOREIGN, MISSING, LAST_STEP, FAULT, TAKE_FAILED, PUBLISH_FAILED = range(1, 9)
-REASONS = ('', 'stepped', 'limit', 'foreign frame', 'frame missing', 'last step', 'fault',
-           'take failed', 'publish failed')
 _GO_ON = 0
 
 # Whole numbers. `asked` is set by other threads to end the loop; `every` is after how many steps

@@ -190,14 +190,11 @@ class Conductor(Member):
         if self.missing():
             return None
         if self.last_step is not None and self.step >= self.last_step:
-            self._wait_for_the_last()
+            # Whoever holds the last step makes one more: by this we know that all have used it.
+            if self.step == self.last_step:
+                self.inbox.advance()
+                self.step += 1
+            else:
+                self.ended = True
             return None
         return self._advance()
-
-    def _wait_for_the_last(self) -> None:
-        # Whoever holds the last step makes one more: by this we know that all have used it.
-        if self.step == self.last_step:
-            self.inbox.advance()
-            self.step += 1
-        else:
-            self.ended = True

@@ -3,7 +3,6 @@
 """How long something takes that happens at every step: percentiles of any number of delays."""
 
 import math
-from typing import NamedTuple
 
 from antenna_drive.physics.arrays import IntArray
 import numpy as np
@@ -17,19 +16,6 @@ _PER_OCTAVE = 16
 _BINS = 28 * _PER_OCTAVE
 
 PERCENTILES = (50.0, 99.0, 99.9)
-
-
-class Percentiles(NamedTuple):
-    """What `PERCENTILES` of all delays do not exceed [s]."""
-
-    p50: float
-    p99: float
-    p99_9: float
-
-    def __str__(self) -> str:
-        """Return them in ms."""
-        return ', '.join(f'p{percent:g} {1e3 * value:.3g} ms'
-                         for percent, value in zip(PERCENTILES, self))
 
 
 def empty_counts() -> IntArray:
@@ -56,7 +42,6 @@ class Delays:
     """
 
     def __init__(self) -> None:
-        """Begin with none."""
         self.counts = empty_counts()
 
     def clear(self) -> None:
@@ -67,19 +52,24 @@ class Delays:
         """Count a delay [s]."""
         _count(self.counts, delay_s)
 
-    def percentiles(self) -> Percentiles | None:
-        """Return the upper ends of the bins that hold the percentiles, None without delays."""
+    def __str__(self) -> str:
+        """Return the percentiles in ms, '' without delays."""
+        return ', '.join(f'p{percent:g} {1e3 * value:.3g} ms'
+                         for percent, value in zip(PERCENTILES, self.percentiles()))
+
+    def percentiles(self) -> list[float]:
+        """Return the upper ends of the bins that hold `PERCENTILES` [s], none without delays."""
         totals = np.cumsum(self.counts)
         if not totals[-1]:
-            return None
+            return []
         wanted = np.ceil(np.array(PERCENTILES) / 100.0 * totals[-1])
         places = np.searchsorted(totals, wanted)
-        return Percentiles(*(_SHORTEST_S * 2.0 ** (places / _PER_OCTAVE)).tolist())
+        return (_SHORTEST_S * 2.0 ** (places / _PER_OCTAVE)).tolist()
 
     def values(self, what: str) -> list[tuple[str, str]]:
         """Return what /diagnostics says of them; `what` takes so long."""
         return [(f'{what} p{percent:g} [ms]', f'{1e3 * delay_s:.3g}')
-                for percent, delay_s in zip(PERCENTILES, self.percentiles() or ())]
+                for percent, delay_s in zip(PERCENTILES, self.percentiles())]
 
 
 # In Python a call of compiled code takes longer than the sum itself.

@@ -76,16 +76,15 @@ def run_drive_unit(default_name: str, names: Sequence[str], args: Sequence[str] 
         unit.step(0, np.zeros((len(unit.inputs), 2)))
         return unit
 
-    return _run(default_name, make, args, fed_by_topic, description, wiring, read_sheet)
+    return _run(default_name, make, args, description, wiring, fed_by_topic, read_sheet)
 
 
-def run_unit(unit: Unit, args: Sequence[str] | None = None, wiring: str = '') -> int:
+def run_unit(unit: Unit, args: Sequence[str] | None = None) -> int:
     """
     Run a unit of your own in the place of one of the wiring; SIGINT or SIGTERM ends the process.
 
     unit : its name is the name of the unit that it stands in for
     args : command line without the program's name; None for the process's own
-    wiring : as for `run_drive_unit`
 
     Returns the exit code of a node that did not start: 2 wrong input, 3 no ROS 2; 0 after --help.
     """
@@ -103,7 +102,7 @@ def run_unit(unit: Unit, args: Sequence[str] | None = None, wiring: str = '') ->
         unit.tune(changes)
         return unit
 
-    return _run(unit.name, make, args, {}, type(unit).__doc__ or '', wiring)
+    return _run(unit.name, make, args, type(unit).__doc__ or '')
 
 
 def run_partner(args: Sequence[str] | None = None, description: str = '') -> int:
@@ -127,25 +126,50 @@ def run_partner(args: Sequence[str] | None = None, description: str = '') -> int
                                 f'{", ".join(wired.signals)}')
         return PartnerUnit(name, wired.outputs[name], reads)
 
-    return _run('partner', make, args, {}, description, '')
+    return _run('partner', make, args, description)
 
 
-def _run(default_name: str, make: MakeUnit, args: Sequence[str] | None,
-         fed_by_topic: Mapping[str, LimitOf], description: str, wiring: str,
+def _run(default_name: str, make: MakeUnit, args: Sequence[str] | None, description: str,
+         wiring: str = '', fed_by_topic: Mapping[str, LimitOf] = MappingProxyType({}),
          read_sheet: ReadSheet | None = None) -> int:
     ending = _Ending()
     end_with_starter()
 
+    def spin(node: Node) -> None:
+        from antenna_drive.emulator.wiring import find
+        from antenna_drive.lockstep.node import DriveNode
+        from antenna_drive.lockstep.node_parameters import OWN_PARAMETERS
+        from antenna_drive.lockstep.ros_parameters import Overrides
+        from antenna_drive.lockstep.starting import told_while_compiling
+
+        overrides = Overrides(node)
+        config = [name for name in overrides.names('config', ()) if name != 'reference']
+        given = {name: value for name, value in overrides.rest().items()
+                 if name not in OWN_PARAMETERS}
+        named = ''.join(overrides.names('wiring', [wiring]))
+        wired = find(named)
+        # the settings that a sheet stands for are parameters; its own name is none
+        overrides.names(SHEET, ())
+        with told_while_compiling(node):
+            unit = make(node.get_name(), wired, config, given)
+            limits = {setting: limit_of(wired.load(*config))
+                      for setting, limit_of in fed_by_topic.items()}
+            drive_node = DriveNode(node, unit, overrides, config, limits, named, wired.outputs,
+                                   read_sheet)
+        ending.by(drive_node.stop)
+        if not ending.asked:
+            drive_node.spin()
+
     def act(arguments: list[str]) -> int:
         with ros_node(default_name, arguments, "config:=\"['old_circuit']\"") as node:
-            _spin(node, make, fed_by_topic, wiring, ending, read_sheet)
+            spin(node)
         # The node has left the graph. What the interpreter and the compiler would still tidy up
         # takes seconds on a busy machine, and a node must be gone within two.
         sys.stdout.flush()
         sys.stderr.flush()
         os._exit(OK)
 
-    return run_program(default_name, _help(default_name, description), args, act)
+    return run_program(default_name, _help(default_name, description), act, args)
 
 
 class _Ending:
@@ -209,6 +233,20 @@ def ros_node(name: str, arguments: Sequence[str], example: str,
         rclpy.try_shutdown()
 
 
+def own_node(name: str, namespace: str = '') -> 'Node':
+    """Return a node in a context of its own; `leave` takes both out of the graph."""
+    from rclpy.context import Context
+    from rclpy.node import Node
+    choose_transport(os.environ)
+    context = Context()
+    context.init(args=[])
+    try:
+        return Node(name, namespace=namespace, context=context)
+    except BaseException:
+        context.try_shutdown()
+        raise
+
+
 def _init_ros(name: str, arguments: Sequence[str], example: str) -> None:
     import rclpy
     from rclpy.signals import SignalHandlerOptions
@@ -231,33 +269,6 @@ def stopped_by_signals() -> Event:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda number, frame: start_new_thread(stop.set, ()))
     return stop
-
-
-def _spin(node: Node, make: MakeUnit, fed_by_topic: Mapping[str, LimitOf], wiring: str,
-          ending: _Ending, read_sheet: ReadSheet | None) -> None:
-    from antenna_drive.emulator.wiring import find
-    from antenna_drive.lockstep.node import DriveNode
-    from antenna_drive.lockstep.node_parameters import OWN_PARAMETERS
-    from antenna_drive.lockstep.ros_parameters import Overrides
-    from antenna_drive.lockstep.starting import told_while_compiling
-
-    overrides = Overrides(node)
-    config = [name for name in overrides.names('config', ()) if name != 'reference']
-    given = {name: value for name, value in overrides.rest().items()
-             if name not in OWN_PARAMETERS}
-    wiring = ''.join(overrides.names('wiring', [wiring]))
-    wired = find(wiring)
-    # the settings that a sheet stands for are parameters; its own name is none
-    overrides.names(SHEET, ())
-    with told_while_compiling(node):
-        unit = make(node.get_name(), wired, config, given)
-        limits = {setting: limit_of(wired.load(*config))
-                  for setting, limit_of in fed_by_topic.items()}
-        drive_node = DriveNode(node, unit, overrides, config, limits, wiring, wired.outputs,
-                               read_sheet)
-    ending.by(drive_node.stop)
-    if not ending.asked:
-        drive_node.spin()
 
 
 def choose_transport(environment: dict[str, str] | os._Environ[str]) -> None:

@@ -200,15 +200,9 @@ class Exchange:
             self._s.scales[n] = scale
 
     @property
-    def outputs(self) -> FloatArray:
-        """Return what the unit has put out last."""
-        return self._form.outputs
-
-    @property
     def stamps(self) -> FloatArray:
         """Return when each of the first steps was made, on the clock of time.monotonic() [s]."""
-        stamps: FloatArray = self._s.stamps
-        return stamps
+        return self._s.stamps
 
     @property
     def step(self) -> int:

@@ -116,13 +116,11 @@ class Follower:
             return
         if unit == self._conductor:
             self._announced = frame[0]
-        self._file(unit, tuple(frame), self._runs.get(frame[0]) or self._another(frame[0]))
-
-    def _another(self, run_id: float) -> _Run:
-        if len(self._runs) >= _MOST_RUNS:
-            del self._runs[next(known for known in self._runs if known != self.run)]
-        run = self._runs[run_id] = _Run()
-        return run
+        if frame[0] not in self._runs:
+            if len(self._runs) >= _MOST_RUNS:
+                del self._runs[next(known for known in self._runs if known != self.run)]
+            self._runs[frame[0]] = _Run()
+        self._file(unit, tuple(frame), self._runs[frame[0]])
 
     def _file(self, unit: str, frame: Frame, run: _Run) -> None:
         number, sender = int(frame[1]), run.senders.setdefault(unit, frame[SENDER])

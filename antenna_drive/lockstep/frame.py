@@ -15,6 +15,7 @@ import secrets
 import struct
 
 from antenna_drive.emulator.unit import Signal
+from antenna_drive.limits import FRAME
 
 HEADER = ('run', 'step', 'step_s', 'sender')
 SENDER = HEADER.index('sender')
@@ -126,10 +127,10 @@ def read_foreign(message: bytes) -> tuple[float, ...]:
     ROS 2's own deserialisation writes a line to the log for each message that it cannot read, so
     anybody could fill a disk.
 
-    Returns no number at all if it is no such message.
+    Returns no number at all if it is no such message, or longer than any that is taken.
     """
     order = {b'\x00\x00': '>', b'\x00\x01': '<'}.get(message[:2])
-    if order is None:
+    if order is None or len(message) > FRAME.value():
         return ()
     body, place = message[4:], 4
     try:

@@ -18,9 +18,8 @@ import secrets
 import time
 
 from antenna_drive.emulator.wiring import UNITS
-from antenna_drive.lockstep.entry import choose_transport
+from antenna_drive.lockstep.entry import own_node
 from antenna_drive.lockstep.leaving import held, leave
-from rclpy.context import Context
 from rclpy.node import Node
 from simgap.errors import UserError
 
@@ -52,15 +51,11 @@ def drive_namespace(given: str | None, command: str) -> Iterator[str]:
         yield f'/{command}_{secrets.token_hex(4)}'
         return
     namespace = f'/{given.strip("/")}'.rstrip('/')
-    choose_transport(os.environ)
-    context = Context()
-    context.init(args=[])
     try:
-        node = Node(f'look_{os.getpid()}', namespace=namespace, context=context)
+        node = own_node(f'look_{os.getpid()}', namespace)
     except ValueError as error:  # rclpy names what is wrong with it
-        context.try_shutdown()
         raise UserError(f'--namespace {given}: {error}') from error
-    domain = context.get_domain_id()
+    domain = node.context.get_domain_id()
     with held(f'antenna_drive/drive/{domain}{namespace}') as free:
         try:
             found = _seen(node, namespace) if free else list(UNITS)

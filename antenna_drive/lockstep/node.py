@@ -10,7 +10,7 @@ from types import MappingProxyType
 from antenna_drive.emulator.unit import FloatArray, Signal, Unit
 from antenna_drive.emulator.wiring import OUTPUTS, TEST_SIGNAL
 from antenna_drive.lockstep import compiled_loop, node_parameters, ros_parameters
-from antenna_drive.lockstep.changes import CHANGES, SETTINGS
+from antenna_drive.lockstep.changes import CHANGES, SETTINGS, write_record
 from antenna_drive.lockstep.compiled_unit import form_of
 from antenna_drive.lockstep.conductor import Conductor
 from antenna_drive.lockstep.exchange import compile_ahead, Exchange
@@ -21,7 +21,7 @@ from antenna_drive.lockstep.partner import ANSWER, PartnerUnit
 from antenna_drive.lockstep.partner_link import Answer, PartnerLink
 from antenna_drive.lockstep.placement import lock_memory, schedule_first_in_first_out
 from antenna_drive.lockstep.rcl_channel import RclChannel, Unusable
-from antenna_drive.lockstep.readings import ChangeRecord, Commanded, Readings
+from antenna_drive.lockstep.readings import CHANGES_QOS, Commanded, Readings
 from antenna_drive.lockstep.report import Report
 from antenna_drive.lockstep.ros_link import FrameLink, Reception
 from antenna_drive.lockstep.run_services import RunServices, StateReader
@@ -32,6 +32,7 @@ from numba.core.errors import NumbaError
 from rclpy.node import Node
 from simgap.errors import one_line
 from simgap.inputs.schema import Value
+from std_msgs.msg import String
 
 # No wait is longer than this [s]: signals and reports are served in between.
 _LONGEST_WAIT_S = 0.2
@@ -97,7 +98,7 @@ class DriveNode:
         self._readings = Readings(
             node, unit.outputs, self._number('publish_rate'), self._pace is not None,
             _as_float(settings[_AMPERES][1]) if _AMPERES in settings else None)
-        self._record = ChangeRecord(node)
+        self._changes = node.create_publisher(String, f'{node.get_name()}/changes', CHANGES_QOS)
         self._report = Report(node, self._member, self._pace, self._link.publishers)
         self._offer(settings, fed_by_topic, read_sheet)
         if self._own['exchange'][1] == 'auto':
@@ -153,14 +154,10 @@ class DriveNode:
                 raise Unusable('the unit is in plain Python')
             compile_ahead(self._unit)
             self._channel = RclChannel(self._node, self._link, self._readings)
-            self._report.exchange = Exchange(self._member, form, self._channel, self._stamps())
+            self._report.exchange = Exchange(self._member, form, self._channel)
         except (Unusable, NumbaError) as reason:
             self._node.get_logger().info(f'the exchange runs in Python: {one_line(reason)}')
         return self._report.exchange
-
-    def _stamps(self) -> int:
-        """Return of how many steps the compiled exchange notes the time; for a benchmark."""
-        return 0
 
     def _force(self, answer: Answer) -> None:
         """Put an answer of nobody in force, as a change."""
@@ -245,7 +242,7 @@ class DriveNode:
         exchange.pauses = sorted(self._pauses())
         reason = exchange.run(self._every, pace)
         if member.step != before:
-            self._made(exchange, before)
+            self._stepped()
         if reason in (compiled_loop.TAKE_FAILED, compiled_loop.PUBLISH_FAILED):
             self._give_up(exchange, reason)
         elif reason == compiled_loop.MISSING:
@@ -260,14 +257,11 @@ class DriveNode:
         if self._services is not None:
             yield self._services.control.halt
 
-    def _made(self, exchange: Exchange, before: int) -> None:
-        """Do what is due after the steps that the compiled exchange has made since `before`."""
-        self._stepped()
-
     def _give_up(self, exchange: Exchange, reason: int) -> None:
         self._exchange = self._report.exchange = None
         self._node.get_logger().warning(
-            f'the exchange goes on in Python: {compiled_loop.REASONS[reason]}, '
+            f'the exchange goes on in Python: '
+            f'{"take" if reason == compiled_loop.TAKE_FAILED else "publish"} failed, '
             f'status {exchange.status}')
         if reason == compiled_loop.PUBLISH_FAILED and not self._member.fault:
             self._link.publish(self._member.message())
@@ -306,8 +300,13 @@ class DriveNode:
                 self._partner.took(changes[ANSWER])  # type: ignore[arg-type]
 
     def _note_changes(self, changes: Mapping[str, Value]) -> None:
-        member = self._member
-        self._report.last_change = self._record.add(member.run, member.step, CHANGES, changes)
+        self._report.last_change = self._tell(self._member.step, CHANGES, changes)
+
+    def _tell(self, step: int, key: str, values: Mapping[str, Value]) -> str:
+        """Say on `<node>/changes` what is in force from `step` on; return the text."""
+        text = write_record(self._member.run, step, key, values)
+        self._changes.publish(String(data=text))
+        return text
 
     def _publish(self, outputs: FloatArray) -> None:
         member = self._member
@@ -334,7 +333,7 @@ class DriveNode:
         self._every = self._readings.every(member.step_s)
         if self._partner is not None:
             self._partner.begin()
-        self._record.add(member.run, 0, SETTINGS, {
+        self._tell(0, SETTINGS, {
             name: value for name, (_, value) in self._unit.settings().items()})
         self._node.get_logger().info(
             f'run {member.run:.0f} begins, macro-step {member.step_s:g} s')

@@ -9,18 +9,15 @@ guest: it joins a run where it is, at the earliest step that the nodes remember,
 long as it keeps within what they remember, the last thousand steps.
 """
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-import os
 import time
 from typing import Any
 
 from antenna_drive.emulator.unit import FloatArray, Signal, Unit
 from antenna_drive.emulator.wiring import OUTPUTS
 from antenna_drive.lockstep.changes import read_record
-from antenna_drive.lockstep.entry import choose_transport
+from antenna_drive.lockstep.entry import own_node
 from antenna_drive.lockstep.frame import NO_RUN, two_of_one_name
 from antenna_drive.lockstep.inbox import Frame
 from antenna_drive.lockstep.leaving import leave
@@ -31,8 +28,6 @@ from antenna_drive.lockstep.run_control import PAUSED
 from antenna_drive.lockstep.run_services import StateReader
 from antenna_drive.lockstep.serving import Serving
 import numpy as np
-from rclpy.context import Context
-from rclpy.node import Node
 from std_msgs.msg import String
 
 OnBegin = Callable[[int, float], None]
@@ -92,13 +87,10 @@ class Observer:
         guest : True for an observer that nobody waits for
         outputs : the signals of each unit
         """
-        choose_transport(os.environ)
         self.names = tuple(
             f'{unit}/{signal.name}' for unit, signals in outputs.items() for signal in signals)
         self._on_begin = on_begin
-        context = Context()
-        context.init(args=[])
-        self.node = Node(name, namespace=namespace, context=context)
+        self.node = own_node(name, namespace)
         birth = float(time.time_ns() // 1000)
         reader = _Reader(name, self.names, on_step)
         self._member = Guest(reader, outputs) if guest else Member(reader, birth, outputs)
@@ -242,10 +234,8 @@ class Observer:
             self._serving.close()
         leave(self.node)
 
-    def __enter__(self) -> Observer:
-        """Return the observer."""
+    def __enter__(self) -> 'Observer':
         return self
 
     def __exit__(self, *error: object) -> None:
-        """Leave the drive."""
         self.close()

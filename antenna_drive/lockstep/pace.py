@@ -27,7 +27,6 @@ class Pace:
     """
 
     def __init__(self, factor: float, lead_s: float = 0.0) -> None:
-        """Set the pace."""
         self.factor = factor
         self.lead_s = lead_s
         self.delays = Delays()
@@ -85,10 +84,9 @@ class Pace:
 
     def summary(self) -> str:
         """Say in words how the steps of this run kept the timetable, '' if they had none."""
-        percentiles = self.delays.percentiles()
-        if percentiles is None:
+        if not str(self.delays):
             return ''
         late = f'{self.late_steps} late'
         if self.late_steps:
             late += f' by up to {1e3 * self.worst_s:.3g} ms'
-        return f'delay of a step {percentiles}; {late}'
+        return f'delay of a step {self.delays}; {late}'

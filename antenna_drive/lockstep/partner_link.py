@@ -135,7 +135,6 @@ class PartnerLink:
     def summary(self) -> str:
         """Say in words how the partner kept its deadline."""
         answers = self.answers
-        percentiles = answers.round_trips.percentiles()
-        took = f', round trip {percentiles}' if percentiles else ''
+        took = f', round trip {answers.round_trips}' if str(answers.round_trips) else ''
         return (f'the partner gave {answers.taken} answers{took}; {answers.misses} misses, '
                 f'{answers.overdue(self._member.step)} steps overdue')

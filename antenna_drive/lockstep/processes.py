@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Start the drive's processes, watch over them, and end every one of them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 import json
 import os
@@ -17,6 +15,7 @@ from typing import IO
 from antenna_drive.emulator.wiring import find, TEST_SIGNAL
 from antenna_drive.lockstep.entry import choose_transport
 from antenna_drive.lockstep.placement import hasten, machine_is_idle
+from antenna_drive.yaml_text import yaml_float
 from simgap.command.programs import PARENT
 from simgap.errors import UserError
 
@@ -37,8 +36,8 @@ class DriveProcesses:
     """
 
     def __init__(self, parameters: Mapping[str, Mapping[str, Parameter]] | None = None, *,
-                 config: Sequence[str] = (), namespace: str = '', domain_id: int | None = None,
-                 order: Sequence[str] = (), wiring: str = '',
+                 config: Sequence[str] = (), namespace: str = '', order: Sequence[str] = (),
+                 wiring: str = '',
                  commands: Mapping[str, Sequence[str]] | None = None,
                  environment: Mapping[str, str] | None = None,
                  placed: bool | None = None) -> None:
@@ -48,7 +47,6 @@ class DriveProcesses:
         config, parameters : configuration files or sets of config/ for every node, and what to set
             on each node over them, by unit and parameter name
         namespace : of every node, '/east'; '' for none
-        domain_id : the ROS 2 domain; None for the one in the environment
         order : the units, in the order in which they are started; that of the wiring if empty
         wiring : module:NAME of the wiring, '' for the drive's own
         commands : commands to run in place of our own nodes, by unit
@@ -63,8 +61,6 @@ class DriveProcesses:
         self._namespace = namespace
         self._commands = dict(commands or {})
         self._environment = {**os.environ, **(environment or {}), PARENT: str(os.getpid())}
-        if domain_id is not None:
-            self._environment['ROS_DOMAIN_ID'] = str(domain_id)
         choose_transport(self._environment)
         self._unpaced = self._parameters.get(TEST_SIGNAL, {}).get('run.pace') == 0.0
         self._hurried = placed
@@ -138,13 +134,11 @@ class DriveProcesses:
                 codes[unit] = process.wait()
         return codes
 
-    def __enter__(self) -> DriveProcesses:
-        """Start all processes."""
+    def __enter__(self) -> 'DriveProcesses':
         self.start()
         return self
 
     def __exit__(self, *error: object) -> None:
-        """End all processes."""
         self.close()
 
     def close(self) -> None:
@@ -155,10 +149,7 @@ class DriveProcesses:
 
 
 def _yaml(value: Parameter) -> str:
-    # JSON is YAML, but for the exponent of a float: YAML 1.1 wants a point in the mantissa
+    # JSON is YAML, but for floats
     if isinstance(value, (list, tuple)):
         return '[' + ', '.join(_yaml(item) for item in value) + ']'
-    if isinstance(value, float):
-        text = repr(value)
-        return text if 'e' not in text or '.' in text else text.replace('e', '.0e')
-    return json.dumps(value)
+    return yaml_float(value) if isinstance(value, float) else json.dumps(value)

@@ -19,9 +19,9 @@ import time
 from typing import Any
 
 from antenna_drive.lockstep.compiled_loop import MESSAGE_WORDS
-from antenna_drive.lockstep.frame import FrameLayout
+from antenna_drive.lockstep.frame import FrameLayout, read_foreign
 from antenna_drive.lockstep.readings import Readings
-from antenna_drive.lockstep.ros_link import FRAME_QOS, FrameLink, read_message, unserved
+from antenna_drive.lockstep.ros_link import FRAME_QOS, FrameLink, unserved
 import numpy as np
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.node import Node
@@ -68,7 +68,7 @@ class RclChannel:
         self.calls: Mapping[str, int] = {
             **{name: _address(rcl, symbol) for name, symbol in _RCL.items()},
             **{name: _address(libc, symbol) for name, symbol in _C.items()}}
-        self.read = read_message
+        self.read = read_foreign
         self._initialise = _function(
             rcutils, 'rcutils_uint8_array_init', ctypes.c_void_p, ctypes.c_size_t, ctypes.c_void_p)
         self._finish = _function(rcutils, 'rcutils_uint8_array_fini', ctypes.c_void_p)

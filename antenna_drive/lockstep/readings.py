@@ -1,13 +1,12 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""What people and plotters read and command: a topic per signal, clock, changes, settings."""
+"""What people and plotters read and command: a topic per signal, clock, settings."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 import struct
 from typing import Any
 
 from antenna_drive.emulator.unit import FloatArray, Signal
-from antenna_drive.lockstep.changes import write_record
 from antenna_drive.lockstep.compiled_loop import TIME
 from antenna_drive.lockstep.frame import READING_PREFIX
 from antenna_drive.lockstep.ros_link import remembered
@@ -16,7 +15,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from rosgraph_msgs.msg import Clock
 from simgap.inputs.schema import Value
-from std_msgs.msg import Float64, String
+from std_msgs.msg import Float64
 
 READING_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
 # Whoever reads may need another reliability or depth, over a radio link for example.
@@ -75,25 +74,6 @@ class Readings:
         if self._clock is not None:
             seconds, nanoseconds = divmod(round(step * step_s * 1e9), 1_000_000_000)
             self._clock.publish(_CLOCK.pack(READING_PREFIX, seconds, nanoseconds))
-
-
-class ChangeRecord:
-    """
-    Publish `<node>/changes`: what took effect at which step of which run.
-
-    A change is in force from the step that it names to the next; `changes` has the format.
-    """
-
-    def __init__(self, node: Node) -> None:
-        """Advertise the topic."""
-        self._publisher = node.create_publisher(
-            String, f'{node.get_name()}/changes', CHANGES_QOS)
-
-    def add(self, run: float, step: int, key: str, values: Mapping[str, Value]) -> str:
-        """Record the SETTINGS or CHANGES that take effect at `step`; return the text."""
-        text = write_record(run, step, key, values)
-        self._publisher.publish(String(data=text))
-        return text
 
 
 class Commanded:

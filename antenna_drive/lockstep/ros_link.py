@@ -12,7 +12,6 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from typing import Any
 
-from antenna_drive.limits import FRAME
 from antenna_drive.lockstep.frame import FrameLayout, read_foreign
 from antenna_drive.lockstep.member import BRIEF_WAIT_S, Member, MEMORY
 from antenna_drive.physics.arrays import FloatArray
@@ -92,7 +91,7 @@ class FrameLink:
             return None
         message: bytes = taken[0]
         frame = decode(message)
-        return read_message(message) if frame is None else frame
+        return read_foreign(message) if frame is None else frame
 
     def take_all(self, peer: str) -> FloatArray | None:
         """
@@ -152,17 +151,6 @@ class FrameLink:
     def publishers(self) -> dict[str, int]:
         """Return how many publishers each peer's frame topic has."""
         return {peer: item.get_publisher_count() for peer, item in self._subscriptions.items()}
-
-
-def read_message(message: bytes) -> tuple[float, ...]:
-    """
-    Return the numbers of a message of somebody else's layout or byte order.
-
-    Returns no number at all if it is no Float64MultiArray, or longer than any that is taken.
-    """
-    if len(message) > FRAME.value():
-        return ()
-    return read_foreign(message)
 
 
 def _never_called(message: Any) -> None:

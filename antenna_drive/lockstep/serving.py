@@ -14,14 +14,10 @@ class Serving:
     """
     Serves a node's subscriptions, services and timers until it is closed.
 
-    Whatever arrives may be wrong: a callback that fails is logged, and the next one
-    is served.
-
-    faults : how many callbacks have failed
+    Whatever arrives may be wrong: a callback that fails is logged, and the next one is served.
     """
 
     def __init__(self, node: Node) -> None:
-        """Begin to serve."""
         self._log = node.get_logger()
         self._executor = SingleThreadedExecutor(context=node.context)
         self._executor.add_node(node)

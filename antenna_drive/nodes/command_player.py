@@ -10,18 +10,11 @@ The recording is a bag (folder or .mcap) or a .csv. The node owns the run as tes
 has its run.* parameters; after the last sample the command stands still.
 """
 
-from __future__ import annotations
-
-from collections.abc import Sequence
+from functools import partial
 import sys
 
 from antenna_drive.programs import run_program
 from simgap.errors import UserError
-
-
-def main(args: Sequence[str] | None = None) -> int:
-    """Run the node; return its exit code."""
-    return run_program('command_player', __doc__, args, _run)
 
 
 def _run(arguments: list[str]) -> int:
@@ -32,6 +25,8 @@ def _run(arguments: list[str]) -> int:
     from antenna_drive.recording.replay import CommandUnit
     return run_unit(CommandUnit(read_recording(arguments[0])), arguments[1:])
 
+
+main = partial(run_program, 'command_player', __doc__, _run)
 
 if __name__ == '__main__':
     sys.exit(main())

@@ -25,17 +25,10 @@ publish_rate  messages for each simulated second and topic, 50 if not given; at 
 joints        names of axis and motors, [axis, motor_1, motor_2] if not given
 """
 
-from __future__ import annotations
-
-from collections.abc import Sequence
+from functools import partial
 import sys
 
 from antenna_drive.programs import run_program
-
-
-def main(args: Sequence[str] | None = None) -> int:
-    """Run the node; return its exit code."""
-    return run_program('joint_states', __doc__, args, _run)
 
 
 def _run(arguments: list[str]) -> int:
@@ -43,6 +36,8 @@ def _run(arguments: list[str]) -> int:
     from antenna_drive.nodes.joint_states_node import run
     return run(arguments)
 
+
+main = partial(run_program, 'joint_states', __doc__, _run)
 
 if __name__ == '__main__':
     sys.exit(main())

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The joints on ROS 2: frames of plant and motors in, sensor_msgs/JointState out."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from threading import Event
 import time
@@ -37,23 +35,7 @@ _PLACES = {unit: {item.name: place for place, item in enumerate(signals)}
 
 
 def run(arguments: Sequence[str]) -> int:
-    """
-    Publish until SIGINT or SIGTERM.
-
-    Parameters
-    ----------
-    arguments
-        command line without the program's name
-
-    Returns
-    -------
-    0
-
-    Raises
-    ------
-    UserError : wrong arguments
-
-    """
+    """Publish until SIGINT or SIGTERM; return 0. Raises UserError: wrong arguments."""
     stop = stopped_by_signals()
     with ros_node(NAME, arguments, 'publish_rate:=50.0') as node:
         overrides = Overrides(node)

@@ -6,18 +6,12 @@ One motor with its amplifiers and gearbox, G_o of Fig. 6, as a ROS 2 node.
 It is motor_1 unless it is named motor_2: --ros-args -r __node:=motor_2
 """
 
-from __future__ import annotations
-
-from collections.abc import Sequence
+from functools import partial
 import sys
 
 from antenna_drive.lockstep.entry import run_drive_unit
 
-
-def main(args: Sequence[str] | None = None) -> int:
-    """Run the node; return its exit code."""
-    return run_drive_unit('motor_1', ('motor_1', 'motor_2'), args, description=__doc__)
-
+main = partial(run_drive_unit, 'motor_1', ('motor_1', 'motor_2'), description=__doc__)
 
 if __name__ == '__main__':
     sys.exit(main())

@@ -11,18 +11,12 @@ The node takes the place of the unit whose name it has. It tells the partner wha
 test_signal it owns the run and has its run.* parameters.
 """
 
-from __future__ import annotations
-
-from collections.abc import Sequence
+from functools import partial
 import sys
 
 from antenna_drive.lockstep.entry import run_partner
 
-
-def main(args: Sequence[str] | None = None) -> int:
-    """Run the node; return its exit code."""
-    return run_partner(args, __doc__)
-
+main = partial(run_partner, description=__doc__)
 
 if __name__ == '__main__':
     sys.exit(main())

@@ -2,18 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """The rate-loop plant of Fig. 4 (hub, flexible modes, axis friction, encoder) as a ROS 2 node."""
 
-from __future__ import annotations
-
-from collections.abc import Sequence
+from functools import partial
 import sys
 
 from antenna_drive.lockstep.entry import run_drive_unit
 
-
-def main(args: Sequence[str] | None = None) -> int:
-    """Run the node; return its exit code."""
-    return run_drive_unit('plant', ('plant',), args, description=__doc__)
-
+main = partial(run_drive_unit, 'plant', ('plant',), description=__doc__)
 
 if __name__ == '__main__':
     sys.exit(main())

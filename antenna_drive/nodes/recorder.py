@@ -20,17 +20,10 @@ Ctrl-C completes the bag. A recorder that is killed loses the last half second a
 power fails, what was written since the last sync may be lost.
 """
 
-from __future__ import annotations
-
-from collections.abc import Sequence
+from functools import partial
 import sys
 
 from antenna_drive.programs import end_with_starter, run_program
-
-
-def main(args: Sequence[str] | None = None) -> int:
-    """Run the node; return its exit code."""
-    return run_program('recorder', __doc__, args, _run)
 
 
 def _run(arguments: list[str]) -> int:
@@ -39,6 +32,8 @@ def _run(arguments: list[str]) -> int:
     from antenna_drive.nodes.recorder_node import run
     return run(arguments)
 
+
+main = partial(run_program, 'recorder', __doc__, _run)
 
 if __name__ == '__main__':
     sys.exit(main())

@@ -2,10 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The recorder on ROS 2: frames and changes in, bags out."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from datetime import datetime
+from functools import partial
 import math
 from pathlib import Path
 import signal
@@ -41,22 +40,12 @@ _PATIENCE_S = 5.0
 
 def run(arguments: Sequence[str]) -> int:
     """
-    Record until SIGINT or SIGTERM.
+    Record until SIGINT or SIGTERM; the arguments are without the program's name.
 
-    Parameters
-    ----------
-    arguments
-        command line without the program's name
+    Returns 0 if everything was recorded, 1 if a bag could not be written, steps were lost, or two
+    nodes of one name took part.
 
-    Returns
-    -------
-    0 if everything was recorded, 1 if a bag could not be written, steps were lost, or two nodes
-    of one name took part
-
-    Raises
-    ------
-    UserError : wrong arguments, an existing target, a wrong test sheet
-
+    Raises UserError: wrong arguments, an existing target, a wrong test sheet.
     """
     with ros_node(NAME, arguments, 'out:=my_run', undeclared=False) as node:
         return _RecorderNode(node).spin()
@@ -108,14 +97,13 @@ class _RecorderNode:
         self._told_doubled: set[str] = set()
         self._ask_by = float('inf')
         for unit in OUTPUTS:
-            node.create_subscription(String, f'{unit}/changes', self._listener(unit), CHANGES_QOS)
+            node.create_subscription(String, f'{unit}/changes', partial(self._listen, unit),
+                                     CHANGES_QOS)
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, self._end)
 
-    def _listener(self, unit: str) -> Any:
-        def listen(message: String) -> None:
-            self._recorder.told(unit, read_record(message.data))
-        return listen
+    def _listen(self, unit: str, message: String) -> None:
+        self._recorder.told(unit, read_record(message.data))
 
     def _end(self, number: int, frame: FrameType | None) -> None:
         self._stop = True

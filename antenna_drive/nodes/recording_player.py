@@ -14,18 +14,11 @@ real   namespace of the topics, 'real' if not given
 pace   as a multiple of real time, 1.0 if not given. A twin needs the row's time at any other pace
 """
 
-from __future__ import annotations
-
-from collections.abc import Sequence
+from functools import partial
 import sys
 
 from antenna_drive.programs import run_program
 from simgap.errors import UserError
-
-
-def main(args: Sequence[str] | None = None) -> int:
-    """Run the node; return its exit code."""
-    return run_program('recording_player', __doc__, args, _run)
 
 
 def _run(arguments: list[str]) -> int:
@@ -34,6 +27,8 @@ def _run(arguments: list[str]) -> int:
     from antenna_drive.nodes.recording_player_node import run
     return run(arguments[0], arguments[1:])
 
+
+main = partial(run_program, 'recording_player', __doc__, _run)
 
 if __name__ == '__main__':
     sys.exit(main())

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The player of recordings on ROS 2: signals and rows out, at a pace."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from threading import Event
 import time
@@ -36,21 +34,10 @@ def run(path: str, arguments: Sequence[str]) -> int:
     """
     Play a recording once, or until SIGINT or SIGTERM.
 
-    Parameters
-    ----------
-    path
-        of the recording
-    arguments
-        ROS 2 arguments
+    path : of the recording
+    arguments : those of ROS 2
 
-    Returns
-    -------
-    0
-
-    Raises
-    ------
-    UserError : the recording cannot be read, or an argument is wrong
-
+    Returns 0. Raises UserError: the recording cannot be read, or an argument is wrong.
     """
     recording = read_recording(path)
     stop = stopped_by_signals()

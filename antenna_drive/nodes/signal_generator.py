@@ -12,24 +12,14 @@ The services pause, resume, step, reset, play and state control the run, as in
   ros2 service call /test_signal/pause std_srvs/srv/Trigger
 """
 
-from __future__ import annotations
-
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+from functools import partial
 import math
 from pathlib import Path
 import sys
-from typing import Any, TYPE_CHECKING
+from typing import Any
 
 from antenna_drive.lockstep.entry import run_drive_unit
-
-if TYPE_CHECKING:
-    from simgap.inputs.schema import Value
-
-
-def main(args: Sequence[str] | None = None) -> int:
-    """Run the node; return its exit code."""
-    return run_drive_unit('test_signal', ('test_signal',), args, {'external': _greatest_rate},
-                          description=__doc__, read_sheet=_read_sheet)
 
 
 def _greatest_rate(parameters: Any) -> float:
@@ -38,11 +28,14 @@ def _greatest_rate(parameters: Any) -> float:
     return parameters.greatest_rate if type(parameters) is Drive else math.inf
 
 
-def _read_sheet(path: str) -> Mapping[str, Value]:
+def _read_sheet(path: str) -> Mapping[str, Any]:
     """Return the settings that play the waveform of a test sheet."""
     from antenna_drive.recording.sheet_signal import settings_of
     return settings_of(Path(path))
 
+
+main = partial(run_drive_unit, 'test_signal', ('test_signal',), description=__doc__,
+               fed_by_topic={'external': _greatest_rate}, read_sheet=_read_sheet)
 
 if __name__ == '__main__':
     sys.exit(main())

@@ -32,17 +32,10 @@ verdict         true: repeat the diagnosis on what there is, on twin/verdict (St
 Drives on other machines: ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET.
 """
 
-from __future__ import annotations
-
-from collections.abc import Sequence
+from functools import partial
 import sys
 
 from antenna_drive.programs import run_program
-
-
-def main(args: Sequence[str] | None = None) -> int:
-    """Run the node; return its exit code."""
-    return run_program('twin', __doc__, args, _run)
 
 
 def _run(arguments: list[str]) -> int:
@@ -50,6 +43,8 @@ def _run(arguments: list[str]) -> int:
     from antenna_drive.nodes.twin_node import run
     return run(arguments)
 
+
+main = partial(run_program, 'twin', __doc__, _run)
 
 if __name__ == '__main__':
     sys.exit(main())

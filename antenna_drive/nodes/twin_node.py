@@ -2,11 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """The twin on ROS 2: the real drive's topics in; twin, residuals, verdict and diagnostics out."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from concurrent.futures import BrokenExecutor
 from contextlib import ExitStack
+from functools import partial
 import json
 import os
 from pathlib import Path
@@ -67,21 +66,9 @@ _SWITCHES = {'tune': True, 'verdict': False}
 
 def run(arguments: Sequence[str]) -> int:
     """
-    Watch until SIGINT or SIGTERM.
+    Watch until SIGINT or SIGTERM; return 0. The arguments are without the program's name.
 
-    Parameters
-    ----------
-    arguments
-        command line without the program's name
-
-    Returns
-    -------
-    0
-
-    Raises
-    ------
-    UserError : wrong arguments, map, sheet, configuration or quiet record
-
+    Raises UserError: wrong arguments, map, sheet, configuration or quiet record.
     """
     with ros_node(NAME, arguments, 'real:=/elevation') as node, ExitStack() as stack:
         return _TwinNode(node, stack).spin()
@@ -147,7 +134,7 @@ class _TwinNode:
         for topic in topics.topics:
             self._node.create_subscription(
                 Float64MultiArray if topic.vector else Float64, topic.name,
-                self._listener(topic), _FROM_REAL)
+                partial(self._listen, topic), _FROM_REAL)
         names = {signal for topic in topics.topics for signal in topic.signals} - {RATE_COMMAND}
         self._publishers = {
             signal: [self._node.create_publisher(Float64, f'{name}/{middle}{signal}', _OUT)
@@ -160,11 +147,9 @@ class _TwinNode:
         self._node.create_subscription(Empty, f'{name}/begin_test',
                                        lambda message: self._tests.put(None), 1)
 
-    def _listener(self, topic: Topic) -> Any:
-        def listen(message: Any, info: Any) -> None:
-            numbers = tuple(message.data) if topic.vector else (message.data,)
-            self._arrived.put((topic, numbers, info['source_timestamp'], time.time_ns()))
-        return listen
+    def _listen(self, topic: Topic, message: Any, info: Any) -> None:
+        numbers = tuple(message.data) if topic.vector else (message.data,)
+        self._arrived.put((topic, numbers, info['source_timestamp'], time.time_ns()))
 
     def _propose(self, request: Any, response: Any) -> Any:
         """Answer who asks for the next test."""

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The drive's own pages: templates for `simgap.report.render`, and the files of the live page."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from simgap.report import render as shared

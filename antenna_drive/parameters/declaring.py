@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """How a parameter is declared in a set: its entry is kept with the field."""
 
-from __future__ import annotations
-
 from dataclasses import field
 from typing import Any
 

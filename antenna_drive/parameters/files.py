@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Where the shipped parameter files are, however the package was installed."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 import os
 from pathlib import Path

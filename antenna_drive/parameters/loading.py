@@ -9,8 +9,6 @@ set; a file with `base: none` at its top stands alone. What holds for one motor 
 a section motor_1 or motor_2: `motor_1: {gearbox: {half_gap: 0.2}}`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass, MISSING, replace
 from itertools import pairwise

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Parameter sets as numpy records: what the compiled physics reads, field by field."""
 
-from __future__ import annotations
-
 from dataclasses import fields
 from functools import cache
 import os

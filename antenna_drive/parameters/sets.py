@@ -8,8 +8,6 @@ article's model does not have: its default is neutral, and the physics is then t
 Letters in [ ] are the symbols of docs/model.md. Currents are in article amperes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 import math

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The parameters of what a drive is commanded."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 from antenna_drive.parameters.declaring import Choice, effect, option

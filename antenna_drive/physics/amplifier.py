@@ -9,8 +9,6 @@ current follows. The equations are those of docs/model.md; the article leaves th
 companion papers.
 """
 
-from __future__ import annotations
-
 from antenna_drive.parameters.sets import Amplifier, Armature
 from simgap.laws.compiling import inner
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The motor's armature: voltage in, current out, Fig. 6."""
 
-from __future__ import annotations
-
 from antenna_drive.parameters.sets import Armature
 from simgap.laws.compiling import inner
 

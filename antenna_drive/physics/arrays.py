@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The kinds of array that the physics works on."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -7,8 +7,6 @@ The lock-step of a node, the compiled run in one process and the continuous run 
 are all made from this declaration and the wiring (`emulator.wiring`).
 """
 
-from __future__ import annotations
-
 from collections import namedtuple
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field

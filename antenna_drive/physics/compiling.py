@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The physics is compiled once for this machine, and again when one of its sources changes."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any

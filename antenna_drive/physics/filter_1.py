@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Filter 1, Eq. (15), in the form k' / (s + p) that Table 1's numbers have."""
 
-from __future__ import annotations
-
 from antenna_drive.parameters.sets import Filter1
 from simgap.laws.compiling import inner
 

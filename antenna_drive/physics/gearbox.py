@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The gearbox between a motor and the axis, Fig. 7, referred to the motor shaft."""
 
-from __future__ import annotations
-
 from antenna_drive.parameters.sets import Gearbox
 from antenna_drive.physics.harmonics import wave, wave_slope
 from simgap.laws.backlash import contact_torque

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What repeats with an angle: teeth, slots, scales and rails are seldom pure sines."""
 
-from __future__ import annotations
-
 from antenna_drive.physics.trigonometry import cosine, sine
 from simgap.laws.compiling import inner
 

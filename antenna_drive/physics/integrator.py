@@ -9,8 +9,6 @@ fourth order of the method, and a smooth dependence on every parameter, survive 
 stiction with steps of a millisecond.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 
@@ -39,25 +37,17 @@ def located_runge_kutta(
     """
     Make the compiled function that advances one unit over one macro-step.
 
-    Parameters
-    ----------
-    rates
-        compiled function (t, x, mode, u, p, dx): writes the time derivative of the states x
-        for a frozen mode into dx; t [s] runs from the start of the macro-step, u are the inputs
-        of shape (n, 2), value and time derivative at t = 0, p the unit's parameters
-    switch
-        compiled function (t, x, mode, u, p, commit) -> bool: tells whether the mode no
-        longer holds; if commit is true it also writes the new mode and resets states
-    states
-        how many there always are, which compiles to straight code; 0 if their number varies
-    inputs_jump
-        True if u may jump between macro-steps: the mode at their start is then looked at again
+    rates : compiled (t, x, mode, u, p, dx): writes the time derivative of the states x for a
+        frozen mode into dx; t [s] runs from the start of the macro-step, u are the inputs of
+        shape (n, 2), value and time derivative at t = 0, p the unit's parameters
+    switch : compiled (t, x, mode, u, p, commit) -> bool: tells whether the mode no longer holds;
+        if commit is true it also writes the new mode and resets states
+    states : how many there always are, which compiles to straight code; 0 if their number varies
+    inputs_jump : True if u may jump between macro-steps: the mode at their start is then looked at
+        again
 
-    Returns
-    -------
-    compiled function (x, mode, u, p, h, steps, work): advances x and mode in place over the
-        macro-step h [s] in so many equal steps; work is from `work_space`
-
+    Returns the compiled function (x, mode, u, p, h, steps, work): it advances x and mode in place
+    over the macro-step h [s] in so many equal steps; work is from `work_space`.
     """
     step_to, settle, locate = _runge_kutta(rates, states), _settling(switch), _location(switch)
 

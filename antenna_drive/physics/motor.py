@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The motor's mechanics: torque of the current against the gear's and the friction's, Fig. 7."""
 
-from __future__ import annotations
-
 from antenna_drive.parameters.sets import Ammeter, Motor, Tachometer
 from antenna_drive.physics.harmonics import wave, wave_slope
 from simgap.laws.compiling import inner

@@ -11,8 +11,6 @@ amplifier 1 (FREE, FROZEN, HELD).
 Inputs: rate command [rad/s], counter torque [V], axis angle [rad], axis rate [rad/s].
 """
 
-from __future__ import annotations
-
 from antenna_drive.parameters.sets import MotorDrive
 from antenna_drive.physics.amplifier import (
     armature_voltage, error_slope, FREE, HELD, integral_rate, limit_centre, limited, next_winding,

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Transfer function 1: the axis rate command becomes the voltage that the amplifiers follow."""
 
-from __future__ import annotations
-
 from antenna_drive.parameters.sets import RateCommand
 from simgap.laws.compiling import inner
 

@@ -7,8 +7,6 @@ A jump lies on a macro-step: the value at a jump is the one after it, and the sl
 its right, so that nobody ever takes a difference across it.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

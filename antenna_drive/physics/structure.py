@@ -9,8 +9,6 @@ Inputs: gear torques of both motors at the motor shaft [N m], what their extrapo
 the last macro-step [N m s], external torque at the axis [N m].
 """
 
-from __future__ import annotations
-
 import math
 
 from antenna_drive.parameters.sets import Axis, Encoder, Plant

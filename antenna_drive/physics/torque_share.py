@@ -8,8 +8,6 @@ Modes: sign of x_3 (0 or 1), saturation of x_2 (-1 at the lower limit, +1 at the
 Inputs: currents of both motors [article A].
 """
 
-from __future__ import annotations
-
 from antenna_drive.parameters.sets import Share, TorqueShare
 from antenna_drive.physics.arrays import FloatArray, IntArray
 from antenna_drive.physics.block import Block, Equation, held, output_rows, put, rows, Signal

@@ -9,8 +9,6 @@ The method is that of W. J. Cody and W. Waite, Software Manual for the Elementar
 whole half-turns are taken off in parts that are exact, and a polynomial does the rest.
 """
 
-from __future__ import annotations
-
 import math
 
 from simgap.laws.compiling import inner

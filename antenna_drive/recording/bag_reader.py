@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 import warnings
 
-from antenna_drive.emulator.wiring import signal_names
+from antenna_drive.emulator.wiring import DRIVE
 from antenna_drive.recording.bag import CONFIGURATION, MESSAGE_TYPE, METADATA, NOTES
 from antenna_drive.recording.bag_storage import DamageError, PACKED, read_storage, Storage
 from antenna_drive.recording.csv_format import parse_known
@@ -176,7 +176,7 @@ def _recording(storage: Storage) -> Recording:
 
 def _namespace(topics: Sequence[str]) -> str:
     """Return the namespace that one drive ran in, '' for none or several."""
-    own = signal_names()
+    own = DRIVE.signals
     found = {topic[:-len(name)].rstrip('/')
              for topic in topics for name in own if topic.endswith(f'/{name}')}
     return found.pop() if len(found) == 1 else ''

@@ -9,8 +9,6 @@ what was synchronised is safe, see `sync_s`. The index of the chunks is held in 
 file ends, so a long bag has several storage files, see `split_s`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 import io
@@ -125,8 +123,7 @@ class BagWriter:
         writer.flush()
         return topics
 
-    def __enter__(self) -> BagWriter:
-        """Return the writer."""
+    def __enter__(self) -> 'BagWriter':
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *rest: object) -> None:

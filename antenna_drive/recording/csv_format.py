@@ -11,8 +11,6 @@ live changes and notes, and the number of rows, by which a file that was cut is 
 docs/recording.md describes the columns.
 """
 
-from __future__ import annotations
-
 from array import array
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack
@@ -42,6 +40,8 @@ from simgap.logs.text import Cell, open_text, parse_nanoseconds, parse_number, r
 TIME = 'time_s'
 _OWN_COLUMN = re.compile(r'(\S+) \[([^\[\]]*)\]', re.ASCII)
 _BLOCK = 65536  # rows written at a time
+
+Column = tuple[IntArray, FloatArray]
 
 
 def read_csv(path: str | Path) -> Recording:
@@ -95,7 +95,7 @@ def read_csv(path: str | Path) -> Recording:
     return replace(_with_meta(path, Recording(channels), len(stamps)), sheet=sheet)
 
 
-def _taken(stamps: IntArray, columns: list[array[float]]) -> Iterator[Column]:
+def _taken(stamps: IntArray, columns: 'list[array[float]]') -> Iterator[Column]:
     """Yield stamps and values of each column, and keep none: ten million rows fill a memory."""
     stamps.flags.writeable = False
     while columns:
@@ -271,9 +271,6 @@ def format_nanoseconds(stamp: int) -> str:
     whole, rest = divmod(abs(stamp), NANOSECONDS)
     fraction = f'{rest:09d}'.rstrip('0') or '0'
     return f'{"-" if stamp < 0 else ""}{whole}.{fraction}'
-
-
-Column = tuple[IntArray, FloatArray]
 
 
 def sorted_rows(path: Path, time_column: str, stamps: IntArray, lines: IntArray,

@@ -4,7 +4,7 @@
 
 from pathlib import Path
 
-from antenna_drive.emulator.wiring import signal_names
+from antenna_drive.emulator import wiring
 from antenna_drive.readings import FIELD_COLUMNS
 from antenna_drive.recording.csv_format import read_csv
 from antenna_drive.recording.recording import Recording, unit_of
@@ -17,7 +17,7 @@ from simgap.logs.mapped import read_mapped
 
 # What a column's unit has to be convertible to: a map's scale makes article amperes of real ones.
 DRIVE = KnownSignals('the drive', {name: unit_of(name).removeprefix('article ')
-                                   for name in signal_names()}, FIELD_COLUMNS)
+                                   for name in wiring.DRIVE.signals}, FIELD_COLUMNS)
 
 
 def read_recording(path: str | Path, *, partial: bool = False) -> Recording:

@@ -25,11 +25,10 @@ class IncompleteRecording(RecordingError):
 
 def check_rows(path: Path, rows: int) -> None:
     """Raise IncompleteRecording unless a bag has so many samples of every signal."""
-    counts = message_counts(path)
-    wrong = {topic: count for topic, count in counts.items() if count != rows}
-    for topic, count in wrong.items():
-        raise IncompleteRecording(f'{path}: holds {count} samples of {topic.lstrip("/")} and not '
-                                  f'{rows}: the run was broken off or begun again')
+    for topic, count in message_counts(path).items():
+        if count != rows:
+            raise IncompleteRecording(f'{path}: holds {count} samples of {topic.lstrip("/")} and '
+                                      f'not {rows}: the run was broken off or begun again')
 
 
 def check_settings(path: Path, told: Mapping[str, Any],

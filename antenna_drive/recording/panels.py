@@ -109,14 +109,18 @@ def _idle(recording: Recording, name: str) -> bool:
 
 def real_amperes(recording: Recording) -> float | None:
     """Return how many real amperes one article ampere is, None if the recording tells nothing."""
-    for motor in ('motor_1', 'motor_2'):
-        try:
-            ratio = recording.configuration[motor]['armature.physical_amperes_per_article_ampere']
-        except (KeyError, TypeError):
-            continue
-        if isinstance(ratio, float):
-            return ratio
-    return None
+    name = 'armature.physical_amperes_per_article_ampere'
+    told = (configured(recording, motor, name) for motor in ('motor_1', 'motor_2'))
+    return next((ratio for ratio in told if ratio is not None), None)
+
+
+def configured(recording: Recording, unit: str, name: str) -> float | None:
+    """Return a number of a recording's configuration, None if that does not tell it."""
+    try:
+        value = recording.configuration[unit][name]
+    except (KeyError, TypeError):
+        return None
+    return value if isinstance(value, float) else None
 
 
 def with_real_amperes(recording: Recording, names: Iterable[str]) -> Recording:

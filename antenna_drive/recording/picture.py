@@ -21,15 +21,12 @@ def draw(recording: Recording, stream: IO[bytes], form: str, *,
 
     recording : what to draw
     stream : where to write the picture
-    form : one of FORMATS
+    form : of the picture, from `picture_format`
     patterns : the signals, such as 'motor_*/current'; all that have samples if not given
     title : above the picture
 
-    Raises RecordingError: there is no such signal or format, or there is no sample.
+    Raises RecordingError: there is no such signal, or there is no sample.
     """
-    if form not in FORMATS:
-        raise RecordingError(f'{form!r}: no format of a picture, allowed are '
-                             f'{", ".join(FORMATS)}')
     # a figure of its own: pyplot would want a screen and keep every figure
     from matplotlib.figure import Figure
     panels = panels_of(recording, patterns)

@@ -12,9 +12,7 @@ Time is kept in whole nanoseconds, as in ROS 2 and MCAP, so that stamps survive 
 format exactly and equal stamps compare equal; `time_s` gives seconds for computing.
 """
 
-from __future__ import annotations
-
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 import math
 from types import MappingProxyType
@@ -84,7 +82,6 @@ class Recording:
     __hash__ = None  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
-        """Check and freeze everything."""
         for name in self.channels:
             check_name(name)
         object.__setattr__(self, 'channels', MappingProxyType(
@@ -122,7 +119,7 @@ class Recording:
 
     @classmethod
     def from_arrays(cls, time_s: ArrayLike, signals: Mapping[str, ArrayLike],
-                    units: Mapping[str, str] | None = None, **known: Any) -> Recording:
+                    units: Mapping[str, str] | None = None, **known: Any) -> 'Recording':
         """
         Make a recording of arrays that share one time axis, such as those of a run.
 
@@ -151,11 +148,9 @@ class Recording:
                                  f'{nearest(name, self.channels)}') from None
 
     def __contains__(self, name: object) -> bool:
-        """Tell whether the signal was recorded."""
         return name in self.channels
 
     def __iter__(self) -> Iterator[str]:
-        """Iterate over the names of the signals."""
         return iter(self.channels)
 
     @property
@@ -180,11 +175,7 @@ class Recording:
 
     # -- cutting ------------------------------------------------------------------------------
 
-    def select(self, names: Sequence[str]) -> Recording:
-        """Return these signals only, in this order; RecordingError if one is not there."""
-        return replace(self, channels={name: self[name] for name in names})
-
-    def between(self, start_s: float = -math.inf, end_s: float = math.inf) -> Recording:
+    def between(self, start_s: float = -math.inf, end_s: float = math.inf) -> 'Recording':
         """Return the samples of start_s <= t < end_s, with their time stamps."""
         low = -2**63 if start_s < -9.2e9 else nanoseconds(start_s)
         high = 2**63 - 1 if end_s > 9.2e9 else nanoseconds(end_s)
@@ -195,14 +186,8 @@ class Recording:
                                 channel.values[first:last])
         return replace(self, channels=cut)
 
-    def shift_ns(self, offset_ns: int, names: Sequence[str] | None = None) -> Recording:
-        """
-        Return the recording with `offset_ns` added to the time stamps of `names`, or of all.
-
-        Raises RecordingError: there is no such signal.
-        """
-        moved = dict(self.channels)
-        for name in self.names if names is None else names:
-            channel = self[name]
-            moved[name] = Channel(channel.unit, channel.time_ns + offset_ns, channel.values)
-        return replace(self, channels=moved)
+    def shift_ns(self, offset_ns: int) -> 'Recording':
+        """Return the recording with `offset_ns` added to all time stamps."""
+        return replace(self, channels={
+            name: Channel(channel.unit, channel.time_ns + offset_ns, channel.values)
+            for name, channel in self.channels.items()})

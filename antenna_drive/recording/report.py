@@ -8,7 +8,7 @@ from typing import Any
 from antenna_drive import __version__
 from antenna_drive.pages import render
 from antenna_drive.recording.figures import MotorStatistics, Statistics, statistics
-from antenna_drive.recording.panels import Panel, panels_of, real_amperes
+from antenna_drive.recording.panels import configured, Panel, panels_of, real_amperes
 from antenna_drive.recording.recording import Recording
 from antenna_drive.recording.sheet import sheet_tree
 from simgap.report.curves import Panel as PlottedPanel
@@ -77,8 +77,8 @@ def _motor_rows(motor: str, own: MotorStatistics, recording: Recording,
                 kappa: float | None) -> Iterable[Row]:
     peak = own.current_peak_A
     real = f', {peak * kappa:.4g} real A' if peak is not None and kappa else ''
-    limit = _lookup(recording.configuration, motor, 'motor.current_limit')
-    limited = f'; limit {limit:g} article A' if isinstance(limit, float) else ''
+    limit = configured(recording, motor, 'motor.current_limit')
+    limited = '' if limit is None else f'; limit {limit:g} article A'
     at = '' if own.current_peak_s is None else f'at {own.current_peak_s:g} s{real}{limited}'
     yield motor, 'current peak', _number(peak, 'article A'), at
     yield motor, 'current, root mean square', _number(own.current_rms_A, 'article A'), ''
@@ -88,14 +88,6 @@ def _motor_rows(motor: str, own: MotorStatistics, recording: Recording,
     yield motor, 'rotor stands still', _share(own.stick), still
     yield (motor, 'backlash crossings', _number(own.backlash_crossings, digits=7),
            'changes of the flank that bears, by the sign of the gear torque')
-
-
-def _lookup(tree: Any, *path: str) -> Any:
-    for key in path:
-        if not isinstance(tree, Mapping) or key not in tree:
-            return None
-        tree = tree[key]
-    return tree
 
 
 def _trees(recording: Recording) -> list[tuple[str, bool, list[tuple[str, str]]]]:

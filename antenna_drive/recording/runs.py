@@ -2,9 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The recording of a run in one process, and the configuration that is kept with it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, TYPE_CHECKING
 
 from antenna_drive.emulator.wiring import UNITS
@@ -19,13 +18,13 @@ if TYPE_CHECKING:  # the compiled physics is not needed to read a recording
 STEP = 'step_s'  # the note that tells the macro-step [s]
 
 
-def configuration_of(units: Mapping[str, Unit]) -> dict[str, Any]:
+def configuration_of(units: Mapping[str, 'Unit']) -> dict[str, Any]:
     """Return every setting in force, unit by unit, as plain data to be kept with a recording."""
     return {name: {key: value for key, (_, value) in unit.settings().items()}
             for name, unit in units.items()}
 
 
-def from_run(run: Run, drive: Drive | None = None, sheet: TestSheet | None = None,
+def from_run(run: 'Run', drive: 'Drive | None' = None, sheet: TestSheet | None = None,
              **notes: Any) -> Recording:
     """
     Return the values of every signal of a run; derivatives are left out.
@@ -47,7 +46,7 @@ def from_run(run: Run, drive: Drive | None = None, sheet: TestSheet | None = Non
         sheet=sheet or TestSheet(), notes={STEP: run.step_s, **notes})
 
 
-def record(emulator: Emulator, duration: float, **known: Any) -> Recording:
+def record(emulator: 'Emulator', duration: float, **known: Any) -> Recording:
     """
     Run an emulator, and record it with the settings that its own units have.
 
@@ -60,6 +59,4 @@ def record(emulator: Emulator, duration: float, **known: Any) -> Recording:
     """
     configuration = configuration_of(emulator.units)
     run = emulator.run(duration, known.pop('changes', None), known.pop('every', 1))
-    recording = from_run(run, **known)
-    return Recording(recording.channels, configuration, recording.changes, recording.sheet,
-                     recording.notes)
+    return replace(from_run(run, **known), configuration=configuration)

@@ -194,8 +194,7 @@ class TestSheet:
 
 def parse_sheet(tree: object) -> TestSheet:
     """Check the plain data of a test sheet; ParameterError names a key that is not allowed."""
-    sheet: TestSheet = _parse('', tree, (TestSheet,))
-    return sheet
+    return _parse('', tree, (TestSheet,))
 
 
 def _parse(key: str, tree: object, classes: tuple[type, ...]) -> Any:

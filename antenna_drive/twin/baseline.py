@@ -22,8 +22,6 @@ variance one, in which a change shows:
    Biometrika 41 (1954) 403).
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 import math
@@ -97,7 +95,7 @@ class Baseline:
                     for name, item in self.signals.items()}}
 
     @classmethod
-    def of_plain(cls, data: Mapping[str, Any]) -> Baseline:
+    def of_plain(cls, data: Mapping[str, Any]) -> 'Baseline':
         """Return the baseline that `plain` gave; KeyError or TypeError if it is none."""
         signals = {}
         for name, item in data['signals'].items():
@@ -119,7 +117,6 @@ class WashOut:
     """The high-pass of the encoder; it begins at rest at its first value."""
 
     def __init__(self) -> None:
-        """Begin."""
         self._last: float | None = None
         self._state = 0.0
 
@@ -160,14 +157,10 @@ def regressors(time: FloatArray, course: FloatArray) -> FloatArray:
     course : the twin's readings there, that of the encoder behind its high-pass, shape (n, 6)
     """
     slopes = np.gradient(course, time, axis=0)
+    way = np.tanh(course[:, _RATE] / _STANDS)  # the direction, -1 to 1
     return np.column_stack([
-        np.ones(time.size), course, slopes, direction(course),
+        np.ones(time.size), course, slopes, way,
         np.gradient(slopes[:, _RATE], time), np.abs(course[:, _RATE])])
-
-
-def direction(course: FloatArray) -> FloatArray:
-    """Return the direction of motion, -1 to 1, shape (n,)."""
-    return np.asarray(np.tanh(course[:, _RATE] / _STANDS))
 
 
 def standardised(rows: FloatArray, centre: FloatArray, scale: FloatArray) -> FloatArray:
@@ -191,7 +184,7 @@ class SignalBlock:
         """Return the slope of the twin's signal, shape (n,)."""
         return np.asarray(self.rows[:, SLOPES + self.column])
 
-    def shifted(self, shift_s: float) -> SignalBlock:
+    def shifted(self, shift_s: float) -> 'SignalBlock':
         """Return the part beside a twin that is earlier by a time [s]."""
         return replace(self, residual=self.residual - shift_s * self.slope)
 
@@ -239,14 +232,3 @@ def block_scores(baseline: SignalBaseline, part: SignalBlock) -> tuple[FloatArra
     left = part.left(baseline)
     return scores(left / baseline.sigma, own[:, 1 + part.column],
                   own[:, SLOPES + part.column], part.rows[:, WAY]), left
-
-
-def standard_scores(baseline: SignalBaseline, found: FloatArray) -> FloatArray:
-    """Return scores in deviations of the quiet record, shape (5,), NaN where they say nothing."""
-    safe = np.where(baseline.deviation > 0.0, baseline.deviation, np.nan)
-    return np.asarray((found - baseline.mean) / safe)
-
-
-def names_of_charts(signals: Sequence[str]) -> list[tuple[str, str]]:
-    """Return signal and score of each chart, in the order of the charts."""
-    return [(name, score) for name in signals for score in SCORES]

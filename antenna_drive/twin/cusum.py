@@ -74,7 +74,6 @@ class Charts:
 
     def __init__(self, two_sided: NDArray[np.bool_], reference: FloatArray, limit: float,
                  clip: float) -> None:
-        """Begin at zero."""
         self._signs = np.array([1.0, -1.0])[:, np.newaxis]
         self._off = np.stack([np.zeros_like(two_sided), ~two_sided])
         self._reference, self._limit, self._clip = reference, limit, clip

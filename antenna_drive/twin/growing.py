@@ -69,7 +69,6 @@ class GrowingVerdict:
     def __init__(self, executor: Executor, drive: Drive,
                  diagnose: Callable[[Mapping[str, Recording], Drive], dict[str, Any]] = diagnosed,
                  ) -> None:
-        """Begin with no test."""
         self._executor, self._drive, self._diagnose = executor, drive, diagnose
         self.rule = Rule()
         self._tests: dict[str, Recording] = {}
@@ -212,7 +211,6 @@ class NextTest:
     """
 
     def __init__(self, executor: Executor, drive: Drive, design: Design = designed) -> None:
-        """Begin with none."""
         self._executor, self._drive, self._design = executor, drive, design
         self._running: Future[dict[str, Any]] | None = None
         self._seconds = 0.0

@@ -40,7 +40,6 @@ class Intake:
     """
 
     def __init__(self, keep_s: float = 300.0) -> None:
-        """Begin with nothing."""
         self._keep_ns = int(keep_s * NANOSECONDS)
         self._stamps: dict[str, array[int]] = {}
         self._values: dict[str, array[float]] = {}

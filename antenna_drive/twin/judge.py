@@ -10,8 +10,8 @@ from antenna_drive.emulator.unit import FloatArray
 from antenna_drive.readings import SIGNALS
 from antenna_drive.recording.recording import unit_of
 from antenna_drive.twin.baseline import (
-    Baseline, BLOCK_S, block_scores, DRIFT_S, ENCODER, interpolated, motion_of, names_of_charts,
-    regressors, residual_of, SCORES, shift_of, SignalBlock, standard_scores, TWO_SIDED, WashOut,
+    Baseline, BLOCK_S, block_scores, DRIFT_S, ENCODER, interpolated, motion_of, regressors,
+    residual_of, SCORES, shift_of, SignalBlock, TWO_SIDED, WashOut,
 )
 from antenna_drive.twin.cusum import Charts, limit_of_rate
 import numpy as np
@@ -106,7 +106,7 @@ class BlockJudge:
     def use(self, baseline: Baseline) -> None:
         """Compare with a quiet record from now on."""
         self.baseline = baseline
-        self._chart_names = names_of_charts(tuple(baseline.signals))
+        self._chart_names = [(name, score) for name in baseline.signals for score in SCORES]
         two_sided = np.tile(TWO_SIDED, len(baseline.signals))
         reference = self._reference + np.concatenate(
             [item.allowance for item in baseline.signals.values()] or [np.zeros(0)])
@@ -183,7 +183,8 @@ class BlockJudge:
                 continue
             found, left = block_scores(item, there[name].shifted(shift))
             sizes[name] = float(np.sqrt(np.mean(left**2)))
-            z.append(standard_scores(item, found))
+            # in deviations of the quiet record, NaN where a score says nothing
+            z.append((found - item.mean) / np.where(item.deviation > 0.0, item.deviation, np.nan))
         if begin < run_in:
             return
         self.blocks += 1

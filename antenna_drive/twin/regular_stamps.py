@@ -43,7 +43,6 @@ class RegularSamples:
     """Samples of signals whose stamps are those of messages, at even times."""
 
     def __init__(self) -> None:
-        """Begin with nothing known of the senders."""
         self._signals: dict[str, tuple[RegularStamps, deque[float]]] = {}
         self._last: dict[str, int] = {}
 
@@ -79,7 +78,6 @@ class RegularStamps:
     """
 
     def __init__(self) -> None:
-        """Begin with nothing known of the sender."""
         self.waiting: deque[int] = deque()
         self._learn()
 

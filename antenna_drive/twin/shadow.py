@@ -15,13 +15,11 @@ from antenna_drive.emulator import units, wiring
 from antenna_drive.emulator.run import Changes, Emulator, MACRO_STEP
 from antenna_drive.emulator.unit import FloatArray, Signal, Unit
 from antenna_drive.parameters.sets import changed, Drive
+from antenna_drive.physics.arrays import IntArray
 from antenna_drive.recording.replay import command_table
 from antenna_drive.recording.sheet import TestSheet
 import numpy as np
-from numpy.typing import NDArray
 from simgap.logs.channel import Channel, NANOSECONDS, nanoseconds
-
-IntArray = NDArray[np.int64]
 
 # So many samples of the command after a moment decide what it did there.
 AHEAD = 5

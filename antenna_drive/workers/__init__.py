@@ -8,8 +8,6 @@ executor of the standard library finishes everything in its queue before it lets
 Ctrl-C through, and its processes outlive a parent that is killed. These do neither.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager

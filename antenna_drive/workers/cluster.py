@@ -8,8 +8,6 @@ back are never made again. The workers need the same antenna_drive as the one th
 task carries a digest of its sources.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import CancelledError, FIRST_COMPLETED, Future, wait
 from contextlib import contextmanager

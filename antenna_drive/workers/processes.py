@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Processes of this machine as workers, which end with the one that asked for them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager

@@ -6,8 +6,6 @@ A batch of tasks and those who do it.
 A task is a function and its arguments; its result comes back as soon as it is there.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Executor, FIRST_COMPLETED, Future, wait
 from concurrent.futures.process import BrokenProcessPool
@@ -35,7 +33,6 @@ class Workers:
     """
 
     def __init__(self, executor: Executor, count: int) -> None:
-        """Hand tasks to an executor."""
         self._executor = executor
         self._count = count
 
@@ -49,18 +46,11 @@ class Workers:
         through once every result that is there has been yielded. Of tasks that have ended
         together those that failed come last: who stops at an error has kept the rest.
 
-        Parameters
-        ----------
-        function
-            a function of a module
-        tasks
-            the arguments of each task; they are asked for when there is room for another
+        function : a function of a module
+        tasks : the arguments of each task; they are asked for when there is room for another
 
-        Yields
-        ------
-        number of the task, from 0, and a function that returns its result or raises what the
-        task raised; TaskLost if the task ended its worker
-
+        Yields the number of the task, from 0, and a function that returns its result or raises
+        what the task raised; TaskLost if the task ended its worker.
         """
         ahead = enumerate(tasks)
         running: dict[Future[Result], int] = {}

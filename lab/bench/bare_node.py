@@ -16,7 +16,7 @@ import signal
 import sys
 from typing import Any
 
-from antenna_drive.emulator.wiring import INPUTS, OUTPUTS, TEST_SIGNAL, UNITS
+from antenna_drive.emulator.wiring import DRIVE, OUTPUTS, TEST_SIGNAL, UNITS
 from antenna_drive.lockstep.frame import FrameLayout
 from lab.bench.stamps import Stamps
 
@@ -27,7 +27,7 @@ def peers_of(unit: str) -> list[str]:
     """Return the units that a unit waits for at every step, as in the lock-step."""
     if unit == TEST_SIGNAL:
         return [name for name in UNITS if name != unit]
-    peers = dict.fromkeys(source.partition('/')[0] for source in INPUTS[unit])
+    peers = dict.fromkeys(source.partition('/')[0] for source in DRIVE.units[unit].sources)
     return [name for name in {**peers, TEST_SIGNAL: None} if name != unit]
 
 

@@ -13,7 +13,7 @@ import tempfile
 from typing import Any
 
 from antenna_drive.emulator.units import build, inner_steps, SourceUnit
-from antenna_drive.emulator.wiring import signal_names, TEST_SIGNAL
+from antenna_drive.emulator.wiring import DRIVE, TEST_SIGNAL
 from antenna_drive.parameters.sets import Axis, Drive, MODES_LIMIT, MotorDrive, Share
 from antenna_drive.physics.arrays import FloatArray
 import numpy as np
@@ -50,7 +50,7 @@ class CDrive:
         commands = np.concatenate((first[np.newaxis], unit.ahead(0, count)))
 
         def run() -> FloatArray:
-            kept = np.empty((1 + count // every, len(signal_names()), 2))
+            kept = np.empty((1 + count // every, len(DRIVE.signals), 2))
             self._run(self._parameters.ctypes.data, count, step_s, inner_steps(step_s), every,
                       commands.ctypes.data, kept.ctypes.data)
             return kept

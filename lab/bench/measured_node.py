@@ -7,6 +7,7 @@ python -m lab.bench.measured_node UNIT FILE LAST --ros-args ...
 """
 
 from collections.abc import Iterator
+from functools import partial
 import importlib
 import sys
 
@@ -35,14 +36,16 @@ def main() -> int:
             yield from super()._pauses()
             yield from (WARM_STEPS, int(last))
 
-        def _stamps(self) -> int:
-            return int(last) + 1
-
-        def _made(self, exchange: Exchange, before: int) -> None:
-            stamps.note_all(exchange.stamps, before + 1, self._member.step)
-            super()._made(exchange, before)
+        def _exchanged(self, exchange: Exchange) -> bool:
+            before = self._member.step
+            done = super()._exchanged(exchange)
+            if self._member.step != before:
+                stamps.note_all(exchange.stamps, before + 1, self._member.step)
+            return done
 
     node.DriveNode = MeasuredNode  # type: ignore[misc]
+    node.Exchange = partial(  # type: ignore[misc,assignment,attr-defined]
+        Exchange, stamps=int(last) + 1)
     return int(importlib.import_module(DRIVE.units[unit].node).main(arguments))
 
 

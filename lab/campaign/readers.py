@@ -230,9 +230,9 @@ def _write_parquet(out: io.BytesIO, columns: Mapping[str, Any]) -> None:
 
 
 def _frame(layout: FrameLayout, message: bytes) -> tuple[float, ...]:
-    from antenna_drive.lockstep.ros_link import read_message
+    from antenna_drive.lockstep.frame import read_foreign
     frame = layout.decode(message)
-    return read_message(message) if frame is None else frame
+    return read_foreign(message) if frame is None else frame
 
 
 def plain(text: bytes) -> Any:

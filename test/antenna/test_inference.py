@@ -115,8 +115,8 @@ def test_a_whole_sheet_that_is_right_is_not_mentioned() -> None:
 
 def test_without_a_bias_voltage_the_bias_is_as_configured() -> None:
     run = field_run(drive_of('new', 'new'), 25.0, **FAST_TRIANGLE)
-    (sheet,), notes = inferred(run.select([
-        name for name in run if name != 'torque_share/bias_voltage']))
+    (sheet,), notes = inferred(replace(run, channels={
+        name: run[name] for name in run if name != 'torque_share/bias_voltage'}))
     assert sheet.bias is None
     assert 'rec_0: the sheet does not give bias: as configured' in notes
 

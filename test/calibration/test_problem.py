@@ -84,7 +84,7 @@ experiments:
   my_step: {duration: 0.5, bias_share: 0.1, settings: {test_signal.rate.waveform: step,
             test_signal.rate.amplitude: 1.0e-4}}
 """))
-    assert problem.results(problem.start()).experiment('my_step').bias_share == 0.1
+    assert problem.results(problem.start())._known['my_step'].bias_share == 0.1
     figure = problem.figure('my.peak').value(problem.results(problem.start()))
     assert 0.0 < figure < 10.0
 

@@ -77,7 +77,7 @@ def test_what_an_upgrade_in_place_took_away_is_told(
         (info / 'top_level.txt').write_text('shared_arm')
         (info / 'RECORD').write_text(f'shared_arm/{files},,\n')
     monkeypatch.syspath_prepend(str(tmp_path))
-    monkeypatch.setitem(health.PARTS, 'arm', health._libraries('arm', 'shared_arm'))
+    monkeypatch.setitem(health.PARTS, 'arm', lambda: health._libraries('arm', 'shared_arm'))
     assert main(['doctor', 'arm', '--json', '-']) == 1
     [item] = findings(capsys)
     assert item['found'] == 'files of shared-arm-core are gone, as after an upgrade in place'

@@ -188,7 +188,7 @@ def test_build_knows_the_units_of_the_wiring_alone() -> None:
     for name in wiring.UNITS:
         unit = build(name, load())
         assert unit.name == name
-        assert unit.inputs == wiring.INPUTS[name]
+        assert unit.inputs == wiring.DRIVE.units[name].sources
         assert unit.outputs == wiring.OUTPUTS[name]
     with pytest.raises(KeyError):
         build('motor_3', load())

@@ -130,7 +130,7 @@ async def _join(url: str) -> None:
 def test_a_drive_that_was_joined_goes_on_without_the_page(
         module_domain: int, tmp_path: Path) -> None:
     with DriveProcesses(config=['new_circuit'], namespace='/east',
-                        domain_id=module_domain) as drive:
+                        environment={'ROS_DOMAIN_ID': str(module_domain)}) as drive:
         with LiveCommand(tmp_path, module_domain, '--join', '--namespace', 'east',
                          '--host', '127.0.0.1', '--token', 'sesame') as live:
             assert live.url.endswith('/?token=sesame')

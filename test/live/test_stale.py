@@ -25,7 +25,7 @@ ROWS = ('[...document.querySelectorAll("#nodes table:first-of-type tr")]'
 def test_a_killed_node_and_a_server_that_has_gone_look_stale(
         module_domain: int, tmp_path: Path, browser: Page) -> None:
     with DriveProcesses(config=['old_circuit'], namespace='/east',
-                        domain_id=module_domain) as drive, \
+                        environment={'ROS_DOMAIN_ID': str(module_domain)}) as drive, \
             LiveCommand(tmp_path, module_domain, '--join', '--namespace', 'east') as live:
         browser.open(live.url)
         browser.until(f'{STATE} === "playing" && antennaDrive.samples.time > 0.5')

@@ -15,7 +15,7 @@ import subprocess
 import sys
 from typing import Any
 
-from antenna_drive.emulator.wiring import signal_names
+from antenna_drive.emulator.wiring import DRIVE
 from antenna_drive.recording import bag_writer
 from antenna_drive.recording.bag_reader import read_bag
 from antenna_drive.recording.bag_writer import BagWriter, write_bag
@@ -31,7 +31,7 @@ from rosbags.typesys import get_typestore, Stores
 from simgap.logs.channel import Channel, RecordingError, RecordingWarning
 import yaml
 
-UNITS = {name: unit_of(name) for name in signal_names()}
+UNITS = {name: unit_of(name) for name in DRIVE.signals}
 STEP_NS = 1_000_000
 
 

@@ -210,15 +210,15 @@ def test_what_lies_beside_a_csv(tmp_path: Path, set_limit: Callable[[Limit, int]
 
 def test_a_frame_of_any_length_is_not_read(set_limit: Callable[[Limit, int], None]) -> None:
     pytest.importorskip('rclpy', reason='rclpy is not installed')
-    from antenna_drive.lockstep.ros_link import read_message
+    from antenna_drive.lockstep.frame import read_foreign
     from rclpy.serialization import serialize_message
     from std_msgs.msg import Float64MultiArray
     few = serialize_message(Float64MultiArray(data=[1.0, 2.0]))
-    assert read_message(few) == (1.0, 2.0)
+    assert read_foreign(few) == (1.0, 2.0)
     many = serialize_message(Float64MultiArray(data=[0.0] * 100_000))
     tracemalloc.start()
     try:
-        assert read_message(many) == ()
+        assert read_foreign(many) == ()
         _, peak = tracemalloc.get_traced_memory()
     finally:
         tracemalloc.stop()

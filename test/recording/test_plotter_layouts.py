@@ -9,7 +9,7 @@ import json
 from typing import Any
 from xml.etree import ElementTree
 
-from antenna_drive.emulator.wiring import signal_names
+from antenna_drive.emulator.wiring import DRIVE
 from antenna_drive.parameters.files import config_dir
 from antenna_drive.recording.recording import unit_of
 
@@ -17,7 +17,7 @@ MUST_SEE = {f'/{name}' for name in (
     'test_signal/rate_command', 'motor_1/current', 'motor_2/current', 'motor_1/tach_rate',
     'motor_2/tach_rate', 'motor_1/gear_torque', 'motor_2/gear_torque', 'plant/axis_rate',
     'plant/encoder', 'torque_share/bias_voltage', 'torque_share/counter_torque')}
-TOPICS = {f'/{name}' for name in signal_names()}
+TOPICS = {f'/{name}' for name in DRIVE.signals}
 
 
 def check(panels: list[tuple[str, list[str]]]) -> None:

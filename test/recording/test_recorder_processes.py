@@ -21,7 +21,7 @@ import pytest
 pytest.importorskip('rclpy', reason='there is no ROS 2 here')
 
 from antenna_drive.emulator.run import Emulator  # noqa: E402, I100
-from antenna_drive.emulator.wiring import signal_names, UNITS  # noqa: E402
+from antenna_drive.emulator.wiring import DRIVE, UNITS  # noqa: E402
 from antenna_drive.lockstep.member import MEMORY  # noqa: E402
 from antenna_drive.lockstep.observer import Observer  # noqa: E402
 from antenna_drive.lockstep.processes import DriveProcesses  # noqa: E402
@@ -52,7 +52,7 @@ SQUARE: dict[str, Any] = {'waveform': 'square', 'amplitude': 0.001, 'period': 1.
 
 def steps_by_rosbags(path: Path) -> dict[str, list[int]]:
     """Return the log times of every topic, in steps of 1 ms, as the rosbags library reads them."""
-    found: dict[str, list[int]] = {f'/{name}': [] for name in signal_names()}
+    found: dict[str, list[int]] = {f'/{name}': [] for name in DRIVE.signals}
     with AnyReader([path]) as reader:
         for connection, stamp, _ in reader.messages():
             assert stamp % 1_000_000 == 0
@@ -272,7 +272,7 @@ def test_a_killed_recorder_loses_a_second_at_most(tmp_path: Path, fresh_domain: 
             process.process.kill()
             process.wait()
             drive.until(lambda: drive.step > killed + 100)  # the drive goes on
-    found: dict[str, list[int]] = {f'/{name}': [] for name in signal_names()}
+    found: dict[str, list[int]] = {f'/{name}': [] for name in DRIVE.signals}
     with (tmp_path / 'run' / 'run_0.mcap').open('rb') as file, pytest.raises(EndOfFile):
         for _, topic, message in NonSeekingReader(file).iter_messages(log_time_order=False):
             assert len(struct.unpack('<4sd', message.data)) == 2

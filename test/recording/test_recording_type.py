@@ -11,7 +11,7 @@ import math
 import pickle
 from typing import Any
 
-from antenna_drive.emulator.wiring import OUTPUTS, signal_names
+from antenna_drive.emulator.wiring import DRIVE, OUTPUTS
 from antenna_drive.recording import recording as module
 from antenna_drive.recording.recording import Change, Recording, unit_of
 from antenna_drive.recording.sheet import parse_sheet
@@ -50,7 +50,7 @@ def test_what_arrives_is_the_same_and_cannot_be_changed_either(sent: Any) -> Non
 
 def test_every_signal_of_the_drive_gets_its_unit_from_the_wiring() -> None:
     units = {f'{unit}/{s.name}': s.unit for unit, signals in OUTPUTS.items() for s in signals}
-    assert {name: unit_of(name) for name in signal_names()} == units
+    assert {name: unit_of(name) for name in DRIVE.signals} == units
     assert unit_of('wind/speed') == unit_of('motor_1/nothing') == ''
 
 
@@ -137,10 +137,9 @@ def test_between_is_half_open_and_keeps_time_stamps() -> None:
     assert ramp(10, 1).between() == ramp(10, 1)
 
 
-def test_shift_moves_the_signals_named() -> None:
-    moved = ramp(10, 1).shift_ns(250_000_000, [CURRENT])
-    assert moved[CURRENT].time_ns[0] == 250_000_000
-    assert moved[COMMAND].time_ns[0] == 0
+def test_shift_moves_every_signal() -> None:
+    moved = ramp(10, 1).shift_ns(250_000_000)
+    assert moved[CURRENT].time_ns[0] == moved[COMMAND].time_ns[0] == 250_000_000
     assert ramp(10, 1).shift_ns(250_000_000).shift_ns(-250_000_000) == ramp(10, 1)
 
 
@@ -193,13 +192,13 @@ def test_live_changes_are_kept_and_frozen() -> None:
 def test_a_recording_shows_itself_in_two_lines() -> None:
     time = np.arange(20_000) * 1e-3
     recording = Recording.from_arrays(
-        time, {name: np.sin(time) for name in signal_names()},
+        time, {name: np.sin(time) for name in DRIVE.signals},
         configuration={'plant': {'modes': [1.0] * 1000}},
         changes=[Change(k, 'motor_1', {'pot': 0.5}) for k in range(500)])
     for text in (repr(recording), str(recording)):
         assert len(text.splitlines()) == 2
         assert max(map(len, text.splitlines())) < 100
-        assert f'{len(signal_names())} signals, {20_000 * len(signal_names())} samples' in text
+        assert f'{len(DRIVE.signals)} signals, {20_000 * len(DRIVE.signals)} samples' in text
         assert '0 to 19.999 s' in text and 'live changes: 500' in text
         assert 'test_signal/rate_command, ' in text
     assert repr(recording['motor_1/current']) == (
