@@ -18,8 +18,6 @@ test of the real machine is a `Log`. `diagnose` says in a `Verdict` which effect
 examples/robot_joint/first.py is the whole in one file. A name is loaded when it is first used.
 """
 
-from __future__ import annotations
-
 import importlib
 from typing import Any, TYPE_CHECKING
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The places of the drive where an unknown input may act."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 import math

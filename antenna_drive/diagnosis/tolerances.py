@@ -6,8 +6,6 @@ The nuisances: tolerances of the machine, its initial conditions, zeros of the s
 They share numbers with the effects.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import fields, replace
 from itertools import product
