@@ -93,7 +93,6 @@ class OneTest:
 
     @property
     def name(self) -> str:
-        """Return the test's name."""
         return self.log.name
 
     @property
@@ -171,9 +170,14 @@ def _plain(path: Path) -> tuple[FloatArray, dict[str, FloatArray], Mapping[str, 
                     if table.is_text:
                         raise
                     del cells[name]  # a column of another kind beside the numbers
-    time, columns = _with_time(path, {
-        name: np.array(cells.pop(name)[:table.lengths.get(name)]) for name in list(cells)})
-    return time, columns, table.constants
+    columns = {name: np.array(cells.pop(name)[:table.lengths.get(name)]) for name in list(cells)}
+    time = next((name for name in TIMES if name in columns), '')
+    if not time:
+        raise LogError(f'{path}: no column {" or ".join(TIMES)}; with --map another column '
+                       'is the time')
+    if np.nanmax(np.abs(columns[time]), initial=0.0) > LATEST_S:
+        raise LogError(f'{path}: {time} is beyond {LATEST_S:g} s; a map says in which unit it is')
+    return columns.pop(time), columns, table.constants
 
 
 def _number(given: Text, cell: Cell) -> float:
@@ -182,17 +186,6 @@ def _number(given: Text, cell: Cell) -> float:
         raise cell.refuse('a vector; --map takes numbers out of vectors')
     text = given.strip()
     return parse_number(text, cell) if text else math.nan
-
-
-def _with_time(path: Path, columns: dict[str, FloatArray],
-               ) -> tuple[FloatArray, dict[str, FloatArray]]:
-    time = next((name for name in TIMES if name in columns), '')
-    if not time:
-        raise LogError(f'{path}: no column {" or ".join(TIMES)}; with --map another column '
-                       'is the time')
-    if np.nanmax(np.abs(columns[time]), initial=0.0) > LATEST_S:
-        raise LogError(f'{path}: {time} is beyond {LATEST_S:g} s; a map says in which unit it is')
-    return columns.pop(time), columns
 
 
 def _mapped(path: Path, import_map: ImportMap, constants: Mapping[str, float],

@@ -175,8 +175,15 @@ class _Samples:
         if stamp is None:
             raise cell.refuse('there is a value, but no time stamp')
         value = signal.factor * (signal.gain * number + signal.offset)
-        _append(self.stamps, self.values, stamp + signal.clock_offset_ns, value, cell,
-                self._duplicates)
+        stamp += signal.clock_offset_ns
+        if not math.isfinite(value) or abs(stamp) >= 2**63:
+            raise cell.refuse('too large a number')
+        if self.stamps and stamp == self.stamps[-1] and self._duplicates != 'refuse':
+            if self._duplicates == 'last':
+                self.values[-1] = value
+            return
+        self.stamps.append(stamp)
+        self.values.append(value)
 
 
 def _element(given: Text, reference: Reference, cell: Cell, decimal: str) -> str:
@@ -215,18 +222,6 @@ def _number_of(text: str, cell: Cell, decimal: str, sign_bit: int) -> float:
 def _point(text: str, decimal: str) -> str:
     """Return a number with a point; one that has a point already is not a number."""
     return text if decimal == '.' else text.replace('.', ' ').replace(decimal, '.')
-
-
-def _append(stamps: array[int], values: array[float], stamp: int, value: float, cell: Cell,
-            duplicates: str) -> None:
-    if not math.isfinite(value) or abs(stamp) >= 2**63:
-        raise cell.refuse('too large a number')
-    if stamps and stamp == stamps[-1] and duplicates != 'refuse':
-        if duplicates == 'last':
-            values[-1] = value
-        return
-    stamps.append(stamp)
-    values.append(value)
 
 
 class _Clock:

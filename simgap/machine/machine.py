@@ -90,13 +90,17 @@ class Machine(ABC):
         for point, one in zip(points, only or [None] * len(points), strict=True):
             row: list[FloatArray | None] = [None] * len(self.experiments)
             for k in range(len(row)) if one is None else (one,):
-                readings = self.predict(point, k)
-                if math.isfinite(until):
-                    time = self.experiments[k].time
-                    readings = np.where((time - time[0] > until)[:, np.newaxis], np.nan, readings)
-                row[k] = readings
+                row[k] = self.predict_until(point, k, until)
             results.append(row)
         return results
+
+    def predict_until(self, point: Point, experiment: int, until: float) -> FloatArray:
+        """Return the readings as `predict`, NaN later than `until` [s] after the first sample."""
+        readings = self.predict(point, experiment)
+        if math.isfinite(until):
+            time = self.experiments[experiment].time
+            readings = np.where((time - time[0] > until)[:, np.newaxis], np.nan, readings)
+        return readings
 
     def truncated(self) -> Machine:
         """Return the machine with as much of each test as a search needs."""

@@ -25,7 +25,6 @@ class ModelBench(Bench):
     played = 'command_{number}.csv'
 
     def __init__(self, model: Model, duration_s: float, play: Play, threads: int = 2) -> None:
-        """Keep what the machine is."""
         self.space = own_tests(model, duration_s)
         self.limits = dict(model.limits)
         self._model, self._play, self._threads = model, play, threads
@@ -44,7 +43,6 @@ class ModelBench(Bench):
 
     def diagnose(self, recordings: Mapping[str, Path], progress: Progress,
                  earlier: Sequence[Rival]) -> Verdict:
-        """Return the diagnosis of all logs, see `Bench`."""
         return diagnose_logs(self._model, [read_log(path) for path in recordings.values()],
                              progress, self._threads, earlier=earlier)
 

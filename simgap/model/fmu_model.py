@@ -70,7 +70,6 @@ class FmuModel:
 
     def run(self, values: FloatArray, start_s: float, step_s: float,
             inputs: FloatArray) -> FloatArray:
-        """Simulate; see `Simulator.run`."""
         outputs = np.full((len(inputs), self._outputs.size), np.nan)
         rows = np.ascontiguousarray(inputs, float)
         self._said = ''

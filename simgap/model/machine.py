@@ -86,16 +86,9 @@ class OwnMachine(Machine):
     def predict(self, point: Point, experiment: int) -> FloatArray:
         return self.pushed(point, experiment, {})
 
-    def simulate(self, points: Sequence[Point], only: Sequence[int | None] | None = None,
-                 until: float = math.inf) -> list[list[FloatArray | None]]:
-        """Return the readings of several variants; no more than is wanted is simulated."""
-        results: list[list[FloatArray | None]] = []
-        for point, one in zip(points, only or [None] * len(points), strict=True):
-            row: list[FloatArray | None] = [None] * len(self.experiments)
-            for k in range(len(row)) if one is None else (one,):
-                row[k] = self.pushed(point, k, {}, until)
-            results.append(row)
-        return results
+    def predict_until(self, point: Point, experiment: int, until: float) -> FloatArray:
+        """Return the readings of a test; no more than is wanted is simulated."""
+        return self.pushed(point, experiment, {}, until)
 
     def simulate_disturbed(self, point: Point, place: DisturbanceInput,
                            course: Course) -> list[FloatArray]:

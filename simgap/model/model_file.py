@@ -94,8 +94,8 @@ def _model(path: Path, top: Mapping[str, Any]) -> Model:
     simulate = _Simulation(
         simulator, tuple(ports.places), longest, tuple(sorted(
             actions, key=lambda item: _ACTS.index(item.act))), inputs, starts, constants,
-        tuple(pushes), tuple(str(body.get('from', name)) for name, (_, body) in readings.items()),
-        tuple(ports.outputs), tuple(readings))
+        tuple(pushes), {name: list(ports.outputs).index(str(body.get('from', name)))
+                        for name, (_, body) in readings.items()})
     return machine(
         simulate,
         base=dict(_numbers('base', top, defaults)),
@@ -120,9 +120,7 @@ class _Simulation:
     starts: Mapping[str, str]
     constants: Mapping[str, str]
     pushes: tuple[str, ...]
-    sources: tuple[str, ...]
-    outputs: tuple[str, ...]
-    readings: tuple[str, ...]
+    readings: Mapping[str, int]  # which output of the program each is
 
     def __call__(self, numbers: Numbers, test: OneTest) -> dict[str, FloatArray]:
         """Return the readings of a test, had the machine these numbers."""
@@ -137,8 +135,8 @@ class _Simulation:
         columns += [test.push[name][held] for name in self.pushes]
         inputs = np.column_stack(columns) if columns else np.empty((count, 0))
         found = self.simulator.run(self._values(numbers, test), float(time[0]), step, inputs)
-        return {reading: np.interp(time, grid, found[:, self.outputs.index(source)])
-                for reading, source in zip(self.readings, self.sources, strict=True)}
+        return {reading: np.interp(time, grid, found[:, place])
+                for reading, place in self.readings.items()}
 
     def _values(self, numbers: Numbers, test: OneTest) -> FloatArray:
         values = dict(zip(self.places, self.simulator.defaults.tolist(), strict=True))

@@ -71,9 +71,9 @@ class MujocoModel:
                                   for place, key in ports.places.items()])
         # since MuJoCo 4 an actuator may have several controls; its first one is meant
         controls = getattr(self._model, 'actuator_ctrladr', range(self._model.nu))
-        actuators = [controls[self._id(mujoco.mjtObj.mjOBJ_ACTUATOR, 'actuator', *item)]
+        actuators = [controls[_id(self._model, mujoco.mjtObj.mjOBJ_ACTUATOR, 'actuator', *item)]
                      for item in ports.inputs.items()]
-        joints = [self._id(mujoco.mjtObj.mjOBJ_JOINT, 'joint', *item)
+        joints = [_id(self._model, mujoco.mjtObj.mjOBJ_JOINT, 'joint', *item)
                   for item in ports.pushes.items()]
         self._columns = [*actuators, *(self._model.nu + self._model.jnt_dofadr[joints])]
         self._sensors = [self._sensor(*item) for item in ports.outputs.items()]
@@ -81,27 +81,15 @@ class MujocoModel:
 
     def run(self, values: FloatArray, start_s: float, step_s: float,
             inputs: FloatArray) -> FloatArray:
-        """Simulate; see `Simulator.run`."""
         if not hasattr(self._local, 'worker'):
             self._local.worker = _Worker(self._model, self._places)
         controls = np.zeros((len(inputs), self._model.nu + self._model.nv))
         controls[:, self._columns] = inputs
         return self._local.worker.run(values, start_s, step_s, controls)[:, self._sensors]
 
-    def _id(self, kind: mujoco.mjtObj, word: str, name: str, key: str) -> int:
-        found = mujoco.mj_name2id(self._model, kind, name)
-        if found < 0:
-            raise ModelError(f'{key}: no {word} {name}'
-                             f'{_nearest(self._model, kind, name)}; name it in the MJCF file')
-        return int(found)
-
     def _sensor(self, name: str, key: str) -> int:
-        found = mujoco.mj_name2id(self._model, mujoco.mjtObj.mjOBJ_SENSOR, name)
-        if found < 0:
-            raise ModelError(
-                f'{key}: no sensor {name}'
-                f'{_nearest(self._model, mujoco.mjtObj.mjOBJ_SENSOR, name)}; add one such as '
-                f'<sensor><jointpos name="{name}" joint="..."/></sensor>')
+        found = _id(self._model, mujoco.mjtObj.mjOBJ_SENSOR, 'sensor', name, key,
+                    f'add one such as <sensor><jointpos name="{name}" joint="..."/></sensor>')
         if self._model.sensor_dim[found] != 1:
             raise ModelError(f'{key}: sensor {name} has {self._model.sensor_dim[found]} values, '
                              'allowed is 1')
@@ -169,10 +157,7 @@ class _Worker:
             raise ModelError(f'{key}: {place}: no such kind{nearest(kind, _KINDS)}; there are '
                              f'{", ".join(_KINDS)}, option')
         prefix, code = _KINDS[kind]
-        number = mujoco.mj_name2id(model, code, name)
-        if number < 0:
-            raise ModelError(f'{key}: {place}: no {kind} {name}{_nearest(model, code, name)}; '
-                             'name it in the MJCF file')
+        number = _id(model, code, kind, name, f'{key}: {place}')
         if kind == 'joint':
             shape = model.jnt_type[number]
             first, freedom = model.jnt_qposadr[number], model.jnt_dofadr[number]
@@ -197,11 +182,13 @@ def _is_start(place: str) -> bool:
     return parts is not None and parts['field'] in _STARTS
 
 
-def _nearest(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str) -> str:
-    """Return ', did you mean ...?' for an object of the model whose name is near."""
-    names = []
-    number = 0
-    while (found := mujoco.mj_id2name(model, kind, number)) is not None:
-        names.append(found)
-        number += 1
-    return nearest(name, names)
+def _id(model: mujoco.MjModel, kind: mujoco.mjtObj, word: str, name: str, key: str,
+        remedy: str = 'name it in the MJCF file') -> int:
+    """Return the index of an object; ModelError if the model has none of that name."""
+    found = mujoco.mj_name2id(model, kind, name)
+    if found < 0:
+        names: list[str] = []
+        while (known := mujoco.mj_id2name(model, kind, len(names))) is not None:
+            names.append(known)
+        raise ModelError(f'{key}: no {word} {name}{nearest(name, names)}; {remedy}')
+    return int(found)
