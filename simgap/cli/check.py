@@ -21,7 +21,6 @@ from simgap.command.output import add_json_option, give, reading
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command."""
     parser.add_argument('model', metavar='FILE.py:NAME',
                         help='Python file and name of the model, or a model file FILE.yaml')
     parser.add_argument('logs', nargs='+', type=Path, metavar='LOG.csv', help='logs of its tests')

@@ -38,7 +38,6 @@ if TYPE_CHECKING:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command."""
     parser.add_argument('model', metavar='MODEL',
                         help='FILE.py:NAME of a declared model, or a model file FILE.yaml')
     parser.add_argument('logs', nargs='+', metavar='LOG', help='logs of its tests')
@@ -47,7 +46,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def add_map_option(parser: argparse.ArgumentParser) -> None:
-    """Add `--map`."""
     parser.add_argument('--map', type=Path, metavar='MAP.yaml',
                         help='which column is which, and how it is written')
 

@@ -19,12 +19,10 @@ from simgap.command.output import reading
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command."""
     parser.add_argument('recording', type=Path, metavar='RECORDING', help='a bag or a table')
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print the map."""
     from simgap.logs.inspection import first_map
     with reading():
         text = first_map(arguments.recording)

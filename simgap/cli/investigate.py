@@ -39,7 +39,6 @@ _UNTIL = 0.9
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command."""
     parser.add_argument('model', metavar='MODEL', help='as for simgap diagnose')
     parser.add_argument('--by', metavar='COMMAND', required=True,
                         help='plays a test: with {test}, {out}, {duration} and {number}')

@@ -38,7 +38,6 @@ _RULES = ('d-optimal', 'random')
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command."""
     add_proposal_options(parser)
     parser.add_argument('--model', metavar='MODEL', required=True, help='as for simgap diagnose')
 
@@ -86,7 +85,10 @@ def proposed(arguments: argparse.Namespace, tests: Callable[[dict[str, Any]], Te
     """
     check_options(arguments, jobs=Entry('', 1, whole=True), duration=Entry('s', 5.0, 600.0),
                   rate=Entry('Hz', 20.0, 10000.0), seed=Entry('', 0, whole=True))
-    planning = _planning(arguments)
+    if arguments.verdict is None and arguments.objective != 'detect':
+        raise UserError('which verdict? The JSON of a diagnosis is needed; without one there is '
+                        '--objective detect')
+    planning = planning_of(arguments.verdict) if arguments.verdict else {}
     from simgap.next_test.design import objective_for, TestDesign
     from simgap.next_test.proposal import as_data, contents, lines
     from simgap.next_test.rivals import Findings
@@ -109,8 +111,8 @@ def proposed(arguments: argparse.Namespace, tests: Callable[[dict[str, Any]], Te
     if arguments.report:
         from simgap.report.render import render
         with replaced(arguments.report) as stream:
-            shown = contents(found, space)
-            stream.write(render('proposal.html', **{**vars(shown), 'data': data}).encode())
+            shown = {**contents(found, space), 'data': data}
+            stream.write(render('proposal.html', **shown).encode())
     told = lines(in_percent(data))
     if objective == 'detect' and not arguments.objective:
         told.insert(0, 'no answers to tell apart: this test looks for other effects; what to do '
@@ -125,16 +127,6 @@ def in_percent(data: dict[str, Any]) -> dict[str, Any]:
         name: item if item['unit'] != '1' or item['size'] is None else
         {'size': 100.0 * item['size'], 'unit': '%'}
         for name, item in data['smallest_sizes'].items()}} if 'smallest_sizes' in data else {})}
-
-
-def _planning(arguments: argparse.Namespace) -> dict[str, Any]:
-    """Return what a verdict says for the design of a further test."""
-    if arguments.verdict is None:
-        if arguments.objective != 'detect':
-            raise UserError('which verdict? The JSON of a diagnosis is needed; without one there '
-                            'is --objective detect')
-        return {}
-    return planning_of(arguments.verdict)
 
 
 def _write(path: Path, found: Proposal, space: TestSpace, data: dict[str, Any]) -> None:

@@ -28,9 +28,17 @@ def interruptible(say: Callable[[], int]) -> Iterator[None]:
     leaving = threading.Event()
 
     def leave() -> None:
-        if not leaving.is_set():
-            leaving.set()
-            _leave(say())
+        if leaving.is_set():
+            return
+        leaving.set()
+        status = say()
+        if 'multiprocessing' in sys.modules:
+            import multiprocessing
+            for child in multiprocessing.active_children():
+                child.terminate()
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(status)
 
     def answer(number: int, frame: FrameType | None) -> None:
         signal.signal(signal.SIGINT, lambda number, frame: leave())
@@ -50,13 +58,3 @@ def interruptible(say: Callable[[], int]) -> Iterator[None]:
     finally:
         watchdog.cancel()
         signal.signal(signal.SIGINT, before)
-
-
-def _leave(status: int) -> None:
-    if 'multiprocessing' in sys.modules:
-        import multiprocessing
-        for child in multiprocessing.active_children():
-            child.terminate()
-    sys.stdout.flush()
-    sys.stderr.flush()
-    os._exit(status)

@@ -16,12 +16,6 @@ def _clipped(z: FloatArray, settings: Settings) -> FloatArray:
     return np.asarray(np.clip(z[np.isfinite(z)], -bound, bound))
 
 
-def fast_power(z: FloatArray, settings: Settings = DEFAULT) -> float:
-    """Return the variance of the fast part of a residual at even times, shape (n,), clipped."""
-    z = _clipped(z, settings)
-    return 0.5 * float(np.mean(np.diff(z) ** 2)) if z.size > 1 else 0.0
-
-
 def power(z: FloatArray, settings: Settings = DEFAULT) -> float:
     """Return the mean square of a residual, shape (n,), clipped."""
     z = _clipped(z, settings)
@@ -29,14 +23,15 @@ def power(z: FloatArray, settings: Settings = DEFAULT) -> float:
 
 
 def slow_excess(z: FloatArray, settings: Settings = DEFAULT) -> float:
-    """Return the power of the slow part of a residual over that of white noise, less one."""
+    """Return the power of the slow part of a residual, shape (n,), over white noise's, less 1."""
     z = _clipped(z, settings)
     length = settings.lack_of_fit.block
     count = z.size // length
     if count < 4 or not np.any(z):
         return 0.0
     blocks = z[:count * length].reshape(count, length).mean(axis=1)
-    return float(length * np.mean(blocks ** 2) / max(fast_power(z, settings), 1e-12) - 1.0)
+    fast = 0.5 * float(np.mean(np.diff(z) ** 2))  # the variance of its fast part, at even times
+    return float(length * np.mean(blocks ** 2) / max(fast, 1e-12) - 1.0)
 
 
 def autocorrelation(z: FloatArray, settings: Settings = DEFAULT) -> float:

@@ -3,6 +3,7 @@
 """What may be said of one parameter, and the check of a value against it."""
 
 from collections.abc import Collection, Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 import difflib
 import math
@@ -65,15 +66,12 @@ class Entry:
 
     def _number(self, key: str, value: object) -> float:
         # bool is an int in Python, and YAML 1.1 reads 8.74e6 as text: both are refused
-        if isinstance(value, bool) or not isinstance(value, (int, float)):
-            raise ParameterError(f'{key}: {quoted(value)} given, allowed is {self.allowed()}')
-        try:
-            number = float(value)
-        except OverflowError:  # an integer beyond every float
-            number = math.inf
-        if not math.isfinite(number) or not self.low <= number <= self.high:
-            raise ParameterError(f'{key}: {quoted(value)} given, allowed is {self.allowed()}')
-        if self.whole and number != int(number):
+        number = math.nan
+        with suppress(OverflowError):  # an integer beyond every float
+            if isinstance(value, (int, float)) and not isinstance(value, bool):
+                number = float(value)
+        if (not math.isfinite(number) or not self.low <= number <= self.high
+                or self.whole and number != int(number)):
             raise ParameterError(f'{key}: {quoted(value)} given, allowed is {self.allowed()}')
         return int(number) if self.whole else number
 

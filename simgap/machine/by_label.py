@@ -44,14 +44,6 @@ def without_labels(machine: Machine) -> Machine:
     return as_configured(machine.inner if isinstance(machine, ByLabel) else machine)
 
 
-def split(form: Form, key: str, values: Sequence[str]) -> Form:
-    """Return a form with sizes of its own under each value of a label, and one shape."""
-    sizes = [replace(p, name=_split_name(p.name, key, value), label=(key, value))
-             for value in dict.fromkeys(values) for p in form.sizes]
-    return replace(form, name=f'{form.name} by {key}'.strip(), parameters=(
-        *sizes, *(p for p in form.parameters if p.is_shape)))
-
-
 def _split_name(name: str, key: str, value: str) -> str:
     return f'{name}[{key}={value}]'
 
@@ -76,8 +68,11 @@ class Labels:
         return self.whole(form)[0]
 
     def split(self, form: Form, key: str) -> Form:
-        """Return a form with sizes of its own under each value of a label."""
-        found = split(form, key, self.groups[key])
+        """Return a form with sizes of its own under each value of a label, and one shape."""
+        sizes = [replace(p, name=_split_name(p.name, key, value), label=(key, value))
+                 for value in dict.fromkeys(self.groups[key]) for p in form.sizes]
+        found = replace(form, name=f'{form.name} by {key}'.strip(), parameters=(
+            *sizes, *(p for p in form.parameters if p.is_shape)))
         self._whole[found] = (form, key)
         return found
 

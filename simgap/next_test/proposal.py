@@ -3,25 +3,21 @@
 """What a proposal says: as plain data, as lines of text, and as what a page shows."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 import math
 from typing import Any
 
 import numpy as np
-from simgap.machine.contract import FloatArray
 from simgap.next_test.candidate import Candidate, Proposal
 from simgap.next_test.design import DesignEffort, SEPARATE
 from simgap.next_test.rivals import known_to
 from simgap.next_test.space import TestSpace
+from simgap.report.curves import Panel
 from simgap.search.rival import Rival
 from simgap.settings import DEFAULT
 
 _OTHERS, _SENSORS, _SIZES = 4, 3, 12
 # A sensor tells two rivals apart if it reads better than this share of its own signal.
 _READABLE = 0.02
-
-Curve = tuple[str, FloatArray, FloatArray]
-Panel = tuple[str, str, str, Sequence[Curve]]
 
 
 def named(rival: Rival) -> str:
@@ -157,25 +153,17 @@ def _promises(data: Mapping[str, Any]) -> list[str]:
     return found
 
 
-@dataclass(frozen=True)
-class ProposalContents:
-    """All that the page about a proposal says."""
-
-    title: str  # in a few words
-    lead: str  # in a sentence
-    data: Mapping[str, Any]  # of `as_data`
-    panels: Sequence[Panel]  # what the likeliest rivals would read, by signal
-
-
-def contents(proposal: Proposal, space: TestSpace) -> ProposalContents:
-    """Return what the page about a proposal says."""
+def contents(proposal: Proposal, space: TestSpace) -> dict[str, Any]:
+    """Return what the page about a proposal says: what proposal.html lists."""
     data = as_data(proposal, space)
     said = lines(data)
     if not data['helps']:
-        return ProposalContents('No test within the limits helps', said[1].strip(), data, ())
+        return {'title': 'No test within the limits helps', 'lead': said[1].strip(),
+                'data': data, 'panels': ()}
     lead = (f'Chosen among {proposal.tried} simulated tests. Every rival keeps '
             f'{100.0 * DesignEffort.margin:.0f} % of every limit in it.')
-    return ProposalContents(f'Next test: {data["family"]}', lead, data, _panels(proposal, space))
+    return {'title': f'Next test: {data["family"]}', 'lead': lead, 'data': data,
+            'panels': _panels(proposal, space)}
 
 
 def _panels(proposal: Proposal, space: TestSpace) -> list[Panel]:

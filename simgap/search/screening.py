@@ -135,13 +135,11 @@ def scan(problem: LeastSquares, state: FitState, known: Sequence[Sensitivity],
                 ) -> tuple[float, Sensitivity, dict[str, float]]:
         """Return the best value between the neighbours of the best trial; all tests judge."""
         _, least, item = entry
-        found = item.form.trials[least]
-        if len(item.form.sizes) == 1:
-            [size] = item.form.sizes
-            grid = [size.low, *(trial[size.name] for trial in item.form.trials), size.high]
-            found = {size.name: float(minimize_scalar(
-                lambda value: tried(item, [{size.name: value}])[0], method='bounded',
-                bounds=(grid[least], grid[least + 2]), options={'maxiter': _REFINEMENTS}).x)}
+        [size] = item.form.sizes  # no other form has trials
+        grid = [size.low, *(trial[size.name] for trial in item.form.trials), size.high]
+        found = {size.name: float(minimize_scalar(
+            lambda value: tried(item, [{size.name: value}])[0], method='bounded',
+            bounds=(grid[least], grid[least + 2]), options={'maxiter': _REFINEMENTS}).x)}
         total = problem.loss(problem.residuals({**here, **item.form.start, **found}))
         return total, item, found
 

@@ -10,7 +10,6 @@ import numpy as np
 from simgap.fit.least_squares import LeastSquares
 from simgap.machine.contract import FloatArray
 from simgap.search.hypothesis import Hypothesis
-from simgap.settings import Settings
 from simgap.verdict.judge import Judge, Withheld
 
 _TURNS = ('each recording in turn, with the effect as the others have it; offsets within the '
@@ -34,15 +33,15 @@ def held_out(problem: LeastSquares, none: Hypothesis, best: Hypothesis, threads:
     known = counted[0].after is not None
     before = [fold.before for fold in counted]
     after = [_after(fold) for fold in counted]
+    gap, left, harmless = _rms(before), _rms(after), 1.0 + problem.settings.held_out.no_harm
     reason = (_reason(folds) if not known else
-              _NO_GAP if _no_gap(_rms(before), _rms(after), problem.settings) else None)
+              _NO_GAP if gap ** 2 < harmless and left ** 2 < harmless else None)
     fraction: float | None = None
     interval: list[float | None] = [None, None]
     if reason is None:
         fraction, interval = _bootstrapped(counted, problem)
     return {
-        'before': _rms(before), 'noise_floor': 1.0,
-        'after': _rms(after) if known or not best.effects else None,
+        'before': gap, 'noise_floor': 1.0, 'after': left if known or not best.effects else None,
         'explained_fraction': {
             'value': fraction, 'ci95': interval, 'bounds': list(BOUNDS),
             'reason': reason, 'interval': _INTERVAL},
@@ -52,12 +51,6 @@ def held_out(problem: LeastSquares, none: Hypothesis, best: Hypothesis, threads:
         'folds': [{'withheld': fold.name, 'judged': list(fold.judged),
                    'values': dict(zip(fold.names, fold.values.tolist(), strict=True)),
                    'cannot_be_judged': dict(fold.reasons)} for fold in folds]}
-
-
-def _no_gap(before: float, after: float, settings: Settings) -> bool:
-    """Return whether rms residuals are noise without effects, and hardly more with them."""
-    return (before ** 2 < 1.0 + settings.held_out.no_harm
-            and after ** 2 < 1.0 + settings.held_out.no_harm)
 
 
 def _judged(effects: Sequence[str], folds: Sequence[Withheld]) -> dict[str, Any]:

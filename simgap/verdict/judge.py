@@ -179,10 +179,6 @@ class Judge:
         if not self._best.effects:
             return fold
         reasons, posterior = self._undetermined(problem, unaided, found)
-        fold = replace(fold, reasons=reasons)
-        numbers = self._numbers(reasons)
-        if not numbers:
-            return fold
         left_out = {p.name for effect, form in self._best.items
                     if effect in reasons for p in form.sizes}
         point = {**found.point(), **dict.fromkeys(left_out, 0.0)}

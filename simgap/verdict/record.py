@@ -11,8 +11,7 @@ from simgap.machine.contract import Machine
 from simgap.search.hypothesis import Hypothesis
 from simgap.verdict.interventions import lines as lines_of_labels
 from simgap.verdict.localisation import Located
-from simgap.verdict.sentence import headline, loud, said
-from simgap.verdict.spoken import quantity
+from simgap.verdict.sentence import beyond, headline, loud, said
 from simgap.verdict.unknown_input import Place
 
 # An effect of more parameters than this is summed up instead of listed.
@@ -119,9 +118,8 @@ def _cannot_be_judged(effects: str, reason: str) -> str:
 def _remainders(found: Mapping[str, Any]) -> list[str]:
     """Return what remains of the signals that matter, or of all if nobody said which do."""
     asked = any(item.get('matters') is not None for item in found.values())
-    return [f'{signal} {quantity(found[signal]["beyond_noise"], found[signal]["unit"])} beyond '
-            f'noise of {quantity(found[signal]["noise"], found[signal]["unit"])}'
-            + (', which matters' if asked else '') for signal in loud(found)]
+    return [f'{signal} {beyond(found[signal])}' + (', which matters' if asked else '')
+            for signal in loud(found)]
 
 
 def share_text(fraction: Mapping[str, Any]) -> str:

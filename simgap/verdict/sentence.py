@@ -140,7 +140,7 @@ def _nothing(verdict: Verdict) -> tuple[str, list[str]]:
     if verdict.word == 'too_few_to_judge':
         return 'Too few samples to judge: no gap shows, and none could.', [
             'record more samples of a longer test']
-    rest = [_beyond(name, verdict.remains[name]) for name in loud(verdict.remains)]
+    rest = [f'{name} is {beyond(verdict.remains[name])}' for name in loud(verdict.remains)]
     if not rest:
         return 'Machine and model agree within tolerance and noise.', []
     return (f'No known effect shows, but not all is noise: what remains of {"; of ".join(rest)}.',
@@ -148,8 +148,9 @@ def _nothing(verdict: Verdict) -> tuple[str, list[str]]:
              f'{_designed(verdict)}'])
 
 
-def _beyond(name: str, item: Mapping[str, Any]) -> str:
-    return (f'{name} is {quantity(item["beyond_noise"], item["unit"])} beyond noise of '
+def beyond(item: Mapping[str, Any]) -> str:
+    """Return by how much what remains of a signal exceeds its noise."""
+    return (f'{quantity(item["beyond_noise"], item["unit"])} beyond noise of '
             f'{quantity(item["noise"], item["unit"])}')
 
 

@@ -23,7 +23,7 @@ import numpy as np
 import pytest
 from simgap.errors import UserError
 from simgap.fit.state import FitState
-from simgap.machine.by_label import split
+from simgap.machine.by_label import Labels
 from simgap.machine.contract import Form
 from simgap.search.hypothesis import Hypothesis
 
@@ -128,7 +128,7 @@ def test_an_effect_that_differs_between_labels_has_no_place_in_a_file(
     name = 'motor_1.torque_constant.change'
     point = hypothesis(machine, {name: -0.1})
     [form] = point.forms
-    own = split(form, 'load', ('A', 'B'))
+    own = Labels({'load': ('A', 'B')}, ()).split(form, 'load')
     state = point.state
     parameters = (*(p for p in state.parameters if p.name != name), *own.parameters)
     values = [*(x for p, x in zip(state.parameters, state.x, strict=True) if p.name != name),

@@ -172,7 +172,7 @@ def test_where_no_load_within_the_limit_helps_the_limit_is_named() -> None:
     said = lines(data)
     assert said[0] == 'no test within the limits helps'
     assert 'load_N' in said[1] and 'strong' in said[1]
-    assert contents(found, Loads(0.2)).title == 'No test within the limits helps'
+    assert contents(found, Loads(0.2))['title'] == 'No test within the limits helps'
 
 
 def test_what_no_test_tells_apart_is_said_with_the_sensor_that_would() -> None:

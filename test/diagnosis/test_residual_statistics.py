@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 from simgap.fit.residual_statistics import (
-    autocorrelation, dependence, dependences, fast_power, power, slow_excess,
+    autocorrelation, dependence, dependences, power, slow_excess,
 )
 from simgap.machine.contract import FloatArray
 
@@ -18,7 +18,6 @@ WHITE: FloatArray = np.random.default_rng(11).normal(size=N)
 
 def test_white_noise_has_power_one_and_nothing_slow() -> None:
     assert power(WHITE) == pytest.approx(1.0, abs=0.01)
-    assert fast_power(WHITE) == pytest.approx(1.0, abs=0.01)
     assert slow_excess(WHITE) == pytest.approx(0.0, abs=0.03)
     assert autocorrelation(WHITE) < 0.01
 
@@ -29,7 +28,6 @@ def test_an_autoregressive_residual_is_as_slow_as_theory_says(phi: float) -> Non
     z = np.asarray(lfilter([np.sqrt(1.0 - phi ** 2)], [1.0, -phi], WHITE))
     lags = np.arange(1, 10)
     mean_of_ten = (1.0 + 2.0 * np.sum((1.0 - lags / 10.0) * phi ** lags)) / 10.0
-    assert fast_power(z) == pytest.approx(1.0 - phi, rel=0.02)
     assert slow_excess(z) == pytest.approx(10.0 * mean_of_ten / (1.0 - phi) - 1.0, rel=0.04)
     assert autocorrelation(z) == pytest.approx(phi, abs=0.01)
 
@@ -58,4 +56,4 @@ def test_dependences_are_listed_by_their_share() -> None:
 def test_too_short_a_residual_says_nothing() -> None:
     assert slow_excess(np.ones(30)) == 0.0
     assert autocorrelation(np.ones(30) + 1e-3 * WHITE[:30]) == 0.0
-    assert fast_power(np.ones(1)) == 0.0 and power(np.full(5, np.nan)) == 0.0
+    assert power(np.full(5, np.nan)) == 0.0
