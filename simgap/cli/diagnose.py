@@ -112,7 +112,7 @@ def write_report(path: str | None, verdict: Verdict, about: Mapping[str, str]) -
         from simgap.report.page import contents
         from simgap.report.render import render
         with replaced(Path(path)) as stream:
-            stream.write(render('verdict.html', **vars(contents(verdict, about))).encode())
+            stream.write(render('verdict.html', **contents(verdict, about)).encode())
 
 
 def numbers_of(option: str, texts: Sequence[str]) -> Iterator[tuple[str, float]]:

@@ -37,7 +37,8 @@ class OwnTests(TestSpace):
     def machine(self, test: Any) -> OwnMachine:
         """Return the machine in one test, with the readings of the model as configured."""
         silent = self._with_readings(test, np.zeros((test.time.size, len(self._model.readings))))
-        every_sample = OwnMachine(replace(self._model, judged_hz=_rate(test)), [silent])
+        rate = 1.0 / float(np.median(np.diff(test.time)))
+        every_sample = OwnMachine(replace(self._model, judged_hz=rate), [silent])
         return OwnMachine(self._model, [self._with_readings(test, every_sample.predict({}, 0))])
 
     def use(self, machine: Machine, points: Sequence[Point]) -> Mapping[str, float]:
@@ -94,7 +95,3 @@ def propose(model: Model, verdict: Verdict | None = None, duration_s: float = 30
     findings = Findings.of_data(verdict.planning) if verdict else Findings()
     return TestDesign(own_tests(model, duration_s), findings, objective_for(findings),
                       threads=threads, seed=seed).run()
-
-
-def _rate(test: Log) -> float:
-    return 1.0 / float(np.median(np.diff(test.time)))

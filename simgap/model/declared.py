@@ -49,7 +49,6 @@ class Number:
 
     @property
     def quotient_step(self) -> float:
-        """Return the step of the difference quotient."""
         return self.step or _STEP_SHARE * (self.high - self.low)
 
 
@@ -124,7 +123,6 @@ class OwnEffect:
 
     @property
     def component(self) -> str:
-        """Return the part of the machine."""
         return self.name.partition('.')[0]
 
 

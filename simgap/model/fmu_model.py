@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 import ctypes
 from ctypes import c_bool, c_double, c_int, c_size_t, c_void_p
 import math
@@ -57,15 +57,15 @@ class FmuModel:
                              'given, allowed is FMI 2 or 3 for co-simulation; export it so')
         self._described = described
         self._variables = {item.name: item for item in described.modelVariables}
-        self.defaults = np.array([float(self._variables[name].start or math.nan)
-                                  for name in self._checked(ports.places)])
         self._places = self._references(ports.places)
+        self.defaults = np.array([float(self._variables[name].start or math.nan)
+                                  for name in ports.places])
         for name, key in ports.pushes.items():
             if name in ports.inputs:
                 raise ModelError(f'{key}: {name}: a column of the log is fed into it; give the '
                                  'FMU an input of its own for the push')
-        self._inputs = self._references(self._checked({**ports.inputs, **ports.pushes}, 'input'))
-        self._outputs = self._references(self._checked(ports.outputs))
+        self._inputs = self._references({**ports.inputs, **ports.pushes}, 'input')
+        self._outputs = self._references(ports.outputs)
         self._slave = self._instance()
 
     def run(self, values: FloatArray, start_s: float, step_s: float,
@@ -157,8 +157,8 @@ class FmuModel:
                 lambda at, over: (step3(instance, at, over, True, *told) <= _WARNING
                                   and not cells[1].value))
 
-    def _checked(self, names: dict[str, str] | Any, causality: str = '') -> dict[str, str]:
-        """Return names of variables if they are numbers, and of a causality."""
+    def _references(self, names: Mapping[str, str], causality: str = '') -> Any:
+        """Return the references of variables if they are numbers, and of a causality."""
         for name, key in names.items():
             if name not in self._variables:
                 raise ModelError(f'{key}: {name}: no such variable'
@@ -170,9 +170,6 @@ class FmuModel:
             if causality and variable.causality != causality:
                 raise ModelError(f'{key}: {name}: its causality is {variable.causality}, allowed '
                                  f'is {causality}')
-        return dict(names)
-
-    def _references(self, names: Iterable[str]) -> Any:
         return np.array([self._variables[name].valueReference for name in names], np.uint32)
 
 

@@ -3,13 +3,12 @@
 """What a page about a diagnosis says to an engineer with two minutes, as plain data."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 from simgap.machine.contract import Experiment, FloatArray
-from simgap.machine.diagram import Diagram, DiagramBlock
+from simgap.machine.diagram import Diagram
 from simgap.report.curves import Panel
 from simgap.verdict.record import share_text, value_lines, Verdict
 from simgap.verdict.sentence import headline, is_open, said
@@ -18,31 +17,8 @@ from simgap.verdict.sentence import headline, is_open, said
 _OPEN = 0.05
 
 
-@dataclass(frozen=True)
-class Contents:
-    """All that the page says."""
-
-    title: str  # what was found: the beginning of the verdict's sentence
-    lead: str  # how sure it is
-    then: str  # what to do next
-    facts: Mapping[str, str]  # what was diagnosed, with what
-    result: Mapping[str, Any]  # the JSON of docs/diagnosis.md, which holds the tables and notes
-    diagram: Diagram  # of the machine
-    # those of the diagram, each with the probability that an effect is there
-    blocks: Sequence[tuple[DiagramBlock, float]]
-    causes: Mapping[str, str]  # the physical cause of each effect of the catalogue
-    numbers: Sequence[Sequence[str]]  # of each answer, a line each
-    explained: str  # how much of the gap its effects explain; empty if it names none
-    # each channel of each experiment, that which gains most first: measured, simulated, difference
-    panels: Sequence[Panel]
-    signals: Sequence[str]  # of the panels
-    # by how much the effects alone move each channel, all else as fitted: rms, in its unit
-    alone: Mapping[str, float]
-    advice: Sequence[str]  # tests that would settle what is open
-
-
-def contents(verdict: Verdict, facts: Mapping[str, str] = MappingProxyType({})) -> Contents:
-    """Return what the page about a diagnosis says; `facts` say what was diagnosed, with what."""
+def contents(verdict: Verdict, facts: Mapping[str, str] = MappingProxyType({})) -> dict[str, Any]:
+    """Return what verdict.html lists; `facts` say what was diagnosed, with what."""
     effects = verdict.machine.catalogue
     what, sure, then = said(verdict)
     title, stop, more = what.partition('. ')
@@ -56,17 +32,19 @@ def contents(verdict: Verdict, facts: Mapping[str, str] = MappingProxyType({})) 
     fraction = verdict.how_far['explained_fraction']
     diagram = verdict.machine.diagram or Diagram.of(suspicion)
     shares = diagram.shares(suspicion)
-    return Contents(
-        title + stop.rstrip(), f'{more} {sure}'.strip(), then,
-        {'verdict': headline(verdict).capitalize(),
-         **dict.fromkeys(('machine', 'configuration', 'recordings'), ''),
-         'compared': _compared(verdict.machine.experiments), **facts},
-        verdict.as_data(), diagram,
-        [(block, min(shares.get(block.component, 0.0), 1.0)) for block in diagram.blocks],
-        {name: effect.cause for name, effect in effects.items()},
-        [value_lines(answer.parameters) for answer in verdict.which],
-        '' if fraction['value'] is None else share_text(fraction), *_curves(verdict),
-        _advice(verdict))
+    panels, signals, alone = _curves(verdict)
+    return {
+        'title': title + stop.rstrip(), 'lead': f'{more} {sure}'.strip(), 'then': then,
+        'facts': {'verdict': headline(verdict).capitalize(),
+                  **dict.fromkeys(('machine', 'configuration', 'recordings'), ''),
+                  'compared': _compared(verdict.machine.experiments), **facts},
+        'result': verdict.as_data(), 'diagram': diagram,
+        'blocks': [(block, min(shares.get(block.component, 0.0), 1.0))
+                   for block in diagram.blocks],
+        'causes': {name: effect.cause for name, effect in effects.items()},
+        'numbers': [value_lines(answer.parameters) for answer in verdict.which],
+        'explained': '' if fraction['value'] is None else share_text(fraction),
+        'panels': panels, 'signals': signals, 'alone': alone, 'advice': _advice(verdict)}
 
 
 def _compared(experiments: Sequence[Experiment]) -> str:

@@ -46,7 +46,6 @@ class Rival:
         return True
 
     def covariance_of(self, names: Sequence[str]) -> FloatArray:
-        """Return the covariance of some of the values."""
         places = [self.names.index(name) for name in names]
         return self.covariance[np.ix_(places, places)]
 

@@ -61,16 +61,12 @@ def _deviating(found: Found, reach: Mapping[str, Any]) -> Callable[[Hypothesis],
     inflated = dict(zip((p.name for p in best.state.parameters),
                         inflation(problem, best.state).tolist(), strict=True))
     usual = fmean([inflated[p.name] for p, _ in best.values] or [1.0])
-    between_tests = _between_tests(reach)
-    return lambda hypothesis: deviations(
-        hypothesis, lambda name: inflated.get(name, usual), problem.settings,
-        between_tests if hypothesis.effects == best.effects else {})
-
-
-def _between_tests(reach: Mapping[str, Any]) -> dict[str, float]:
-    """Return how much the effects' numbers depend on the tests, by name."""
     values: dict[str, list[float]] = {}
     for fold in reach['folds']:
         for name, value in fold['values'].items():
             values.setdefault(name, []).append(value)
-    return {name: jackknife(found) for name, found in values.items()}
+    # how much the effects' numbers depend on the tests
+    between_tests = {name: jackknife(found) for name, found in values.items()}
+    return lambda hypothesis: deviations(
+        hypothesis, lambda name: inflated.get(name, usual), problem.settings,
+        between_tests if hypothesis.effects == best.effects else {})

@@ -62,7 +62,7 @@ def made(point: Any, seconds: float, names: tuple[str, ...] = ('square', 'triang
 
 
 def page(diagnosis: Verdict) -> str:
-    return render('verdict.html', **vars(contents(diagnosis)))
+    return render('verdict.html', **contents(diagnosis))
 
 
 def check_schema(result: Any) -> Any:

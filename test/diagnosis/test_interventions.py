@@ -169,5 +169,5 @@ def test_the_summary_and_the_page_say_what_differs() -> None:
     found = diagnose(of_loads({'heater.step.size': -0.3}, {'heater.step.size': -0.5}))
     [line] = [line for line in found.summary().splitlines() if 'differs' in line]
     assert line.startswith('  heater.step: size differs by -0.') and 'from A to B' in line
-    page = render('verdict.html', **vars(contents(found)))
+    page = render('verdict.html', **contents(found))
     assert 'What the labels change' in page and 'heater.step' in page

@@ -122,8 +122,8 @@ def test_a_log_that_was_not_used_is_predicted_to_the_noise_with_the_effect_only(
 
 
 def test_the_page_shows_the_models_own_parts_and_no_other_machine() -> None:
-    page = render('verdict.html', **vars(contents(diagnose_logs(
-        swing(blocks=('swing', 'sensor')), logs({'drift': 0.01})))))
+    page = render('verdict.html', **contents(diagnose_logs(
+        swing(blocks=('swing', 'sensor')), logs({'drift': 0.01}))))
     for word in ('>sensor', '>swing', 'it warms up', 'rad/s', 'sensor.drift'):
         assert word in page
     text = page.split('<body>')[1].split('<script')[0].lower()

@@ -97,7 +97,7 @@ def browser(tmp_path: Path) -> Iterator[Page]:
 
 def show(browser: Page, tmp_path: Path, result: dict[str, Any], **machine: Any) -> str:
     path = tmp_path / 'verdict.html'
-    path.write_text(render('verdict.html', **vars(contents(diagnosis(result, **machine)))))
+    path.write_text(render('verdict.html', **contents(diagnosis(result, **machine))))
     browser.open(path.as_uri())
     assert browser.tell('document.documentElement.dataset.state') == 'drawn'
     assert browser.complaints == []
@@ -143,8 +143,8 @@ def test_the_page_begins_with_the_sentence_and_with_what_was_diagnosed(
         'best_of_catalogue': ['motors.friction']}}}, words={'motors.friction': lambda numbers: (
             'the motors rub 50 percent more', ['run `this`', 'look'])})
     path = tmp_path / 'verdict.html'
-    path.write_text(render('verdict.html', **vars(contents(verdict, {
-        'machine': HOSTILE, 'recordings': 'a.csv (2026-01-02)', 'made by': 'it 1.0'}))))
+    path.write_text(render('verdict.html', **contents(verdict, {
+        'machine': HOSTILE, 'recordings': 'a.csv (2026-01-02)', 'made by': 'it 1.0'})))
     browser.look(390, 800)
     browser.open(path.as_uri())
     text = ' '.join(str(browser.tell('document.body.innerText')).replace('\xa0', ' ').split())
@@ -314,9 +314,9 @@ def test_the_page_says_how_much_is_compared_and_counts_time_as_the_recording() -
                                    for experiment, zero in zip(
                                        verdict.machine.experiments, (5.0, 15.0), strict=True)]
     found = contents(verdict, {'recordings': 'far.csv', 'made by': 'it 1.0'})
-    assert found.facts['compared'] == 'far 4 of 20 s (20 percent)'
-    assert list(found.facts)[-2:] == ['compared', 'made by'], 'beside the recordings'
-    begins = {time[0] for _, _, _, curves in found.panels for _, time, _ in curves}
+    assert found['facts']['compared'] == 'far 4 of 20 s (20 percent)'
+    assert list(found['facts'])[-2:] == ['compared', 'made by'], 'beside the recordings'
+    begins = {time[0] for _, _, _, curves in found['panels'] for _, time, _ in curves}
     assert begins == {5.0, 15.0}
 
 
@@ -328,7 +328,7 @@ def test_the_table_tells_the_effect_from_what_is_fitted_beside_it() -> None:
         np.full_like(TIME, point.get(size.name, 0.0))])] * 2 for point in points])
     fitted = SimpleNamespace(point=lambda: {size.name: 3.0, 'zero': 1.0})
     best: Any = SimpleNamespace(state=fitted, forms=(Form('', (size,)),))
-    assert contents(replace(verdict, best=best)).alone == pytest.approx(
+    assert contents(replace(verdict, best=best))['alone'] == pytest.approx(
         {'speed': 0.0, HOSTILE: 3.0})
 
 
@@ -342,7 +342,7 @@ def test_a_phone_shows_every_number_of_a_wide_table(browser: Page, tmp_path: Pat
         'remains': {HOSTILE: {**FULL['remains'][HOSTILE], 'noise': 1.75e-06}}})
     best: Any = SimpleNamespace(state=SimpleNamespace(point=dict), forms=(Form('', (size,)),))
     path = tmp_path / 'verdict.html'
-    path.write_text(render('verdict.html', **vars(contents(replace(verdict, best=best)))))
+    path.write_text(render('verdict.html', **contents(replace(verdict, best=best))))
     browser.look(390, 800)
     browser.open(path.as_uri())
     assert browser.tell('[...document.querySelectorAll(".stack td")].map(e => [e.textContent,'
