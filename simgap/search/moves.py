@@ -128,8 +128,7 @@ def led(problem: LeastSquares, base: Hypothesis) -> Hypothesis:
     point = state.point()
     for part in (alone, problem):
         # the derivatives where it stood serve until fresh ones are taken
-        begun = part.start(state.parameters, starts.with_initial_conditions(part, point),
-                           state.jacobian * part.valid[:, np.newaxis])
+        begun = part.start(state.parameters, starts.with_initial_conditions(part, point))
         found = starts.settled(part, part.fit(begun, iterations), 1)
         point = found.point()
     return replace(base, state=found) if found.cost < state.cost else base
