@@ -127,7 +127,6 @@ def led(problem: LeastSquares, base: Hypothesis) -> Hypothesis:
                          settings=problem.settings)
     point = state.point()
     for part in (alone, problem):
-        # the derivatives where it stood serve until fresh ones are taken
         begun = part.start(state.parameters, starts.with_initial_conditions(part, point))
         found = starts.settled(part, part.fit(begun, iterations), 1)
         point = found.point()
