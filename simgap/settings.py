@@ -53,7 +53,7 @@ class SearchSettings:
     """The search for effects."""
 
     adds: int = _at(10, '1', 'forms that are fitted after the first screening', YARDSTICK)
-    leading: int = _at(3, '1', 'hypotheses that are expanded first', YARDSTICK)
+    leading: int = _at(3, '1', 'hypotheses that are expanded first, at most', YARDSTICK)
     partners: int = _at(5, '1', 'effects that are added to each of them', YARDSTICK)
     rounds: int = _at(
         4, '1', 'greatest number of times that the best are expanded, and of effects')
@@ -67,7 +67,7 @@ class SearchSettings:
     iterations: int = _at(8, '1', 'iterations of a fit between two Jacobians')
     settled: float = _at(
         2e-3, '1', 'gain of a pass, as a share of the cost, below which a fit has ended')
-    finalists: int = _at(6, '1', 'hypotheses that are fitted to the whole tests')
+    finalists: int = _at(6, '1', 'hypotheses that are fitted to the whole tests, at most')
     passes: int = _at(2, '1', 'fresh Jacobians of the fit that is judged')
 
 
