@@ -8,6 +8,8 @@ hand it to the lock-step thread and answer when it is in force, so that what `ro
 says is what the unit uses.
 """
 
+from __future__ import annotations
+
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 import math
