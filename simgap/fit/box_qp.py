@@ -19,8 +19,8 @@ def box_constrained_step(hessian: FloatArray, gradient: FloatArray, low: FloatAr
     """
     Return the step d, shape (m,), within low <= d <= high that maximises g d - d hessian d / 2.
 
-    The Hessian, shape (m, m), is positive semidefinite, and 0 is within the bounds. Variables that
-    are far from theirs are eliminated; one that a step takes beyond them is so no longer.
+    The Hessian, shape (m, m), is positive semidefinite, and 0 is within the bounds. Variables far
+    from their bounds are eliminated. One that a step takes beyond its bounds is not any more.
     """
     diagonal = np.diag(hessian)
     reach = 1.0 / np.sqrt(np.maximum(diagonal, 1e-30))

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The Cholesky factor of a Hessian that was summed in single precision."""
 
+from collections.abc import Callable
+
 import numpy as np
 from scipy import linalg
 from simgap.machine.contract import FloatArray
@@ -25,6 +27,17 @@ def factored(matrix: FloatArray, ridge: float = 0.0) -> FloatArray:
         if not failed:
             return np.asarray(factor)
         ridge = max(10.0 * ridge, ROUNDING)
+
+
+def solver(matrix: FloatArray) -> Callable[[FloatArray], FloatArray]:
+    """
+    Return what solves for such a Hessian with any diagonal, shape (m, m).
+
+    It takes and returns the shape (m,) or (m, k). Rounding errors may have made it indefinite.
+    """
+    scale = np.sqrt(np.maximum(np.diag(matrix), 1e-30))
+    factor = factored(matrix / np.outer(scale, scale), ROUNDING)
+    return lambda right: np.asarray((solved(factor, (right.T / scale).T).T / scale).T)
 
 
 def solved(factor: FloatArray, right: FloatArray) -> FloatArray:

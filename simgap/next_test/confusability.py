@@ -4,13 +4,14 @@
 
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
+from functools import cache, partial
 import math
 from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq
 from simgap.fit.box_qp import box_constrained_step
-from simgap.fit.cholesky import factored, ROUNDING, solved
+from simgap.fit.cholesky import solver
 from simgap.fit.least_squares import LeastSquares
 from simgap.fit.noise import with_model_error
 from simgap.fit.state import FitState, prior_precision, proper_precision
@@ -55,16 +56,13 @@ def visibility(problem: LeastSquares, state: FitState,
     # an everyday size would imitate its own effect; up to the tolerance nothing is said to show
     here, state = state.point(), _without_everyday(state)
     jacobian = state.jacobian.astype(float)
-    known = state.hessian + np.diag(proper_precision(state.parameters))
-    scale = np.sqrt(np.diag(known))
-    factor = factored(known / np.outer(scale, scale), ROUNDING)
+    imitated = solver(state.hessian + np.diag(proper_precision(state.parameters)))
     ids, units, sizes, columns, remainders = [], [], [], [], []
     price = inflated * settings.evidence.shows
     hessian = state.hessian + np.diag(prior_precision(state.parameters))
     low, high = (np.array([getattr(p, side) for p in state.parameters]) - state.x
                  for side in ('low', 'high'))
-    unit = np.sqrt(np.maximum(np.diag(hessian), 1e-30))
-    unbounded = factored(hessian / np.outer(unit, unit), ROUNDING)
+    unbounded = solver(hessian)
     sure = 1.0 - settings.interval.derivative_error ** 2
     asked = [effect for effect in machine.catalogue.values() if not among or effect.id in among]
     for i, effect in enumerate(asked):
@@ -74,22 +72,14 @@ def visibility(problem: LeastSquares, state: FitState,
         column = problem.jacobian({**here, **form.start}, [first], state.residual,
                                   central=False)[:, 0]
         cross = jacobian.T @ column.astype(float)
-        imitated = solved(factor, cross / scale) / scale
         ids.append(effect.id)
         units.append(first.unit)
         power = float(column @ column)
-
-        def left(size: float, cross: FloatArray = cross, power: float = power) -> float:
-            gradient = -size * cross
-            step = box_constrained_step(hessian, gradient, low, high)
-            return (0.5 * size ** 2 * power * sure
-                    - float(gradient @ step - 0.5 * step @ hessian @ step))
-
-        followed = solved(unbounded, cross / unit) / unit
-        free = 0.5 * (power * sure - float(cross @ followed))
-        sizes.append(_least_visible(first, power, free, left, price))
+        free = 0.5 * (power * sure - float(cross @ unbounded(cross)))
+        sizes.append(_least_visible(first, power, free, partial(
+            _left, hessian, cross, power * sure, low, high), price))
         columns.append(column)
-        remainders.append(column - jacobian @ imitated)
+        remainders.append(column - jacobian @ imitated(cross))
     # what nuisances imitate has the price of their priors
     shape = (len(asked), state.residual.size)
     gram = np.reshape(columns, shape) @ np.reshape(remainders, shape).T
@@ -105,17 +95,27 @@ def _without_everyday(state: FitState) -> FitState:
                     state.jacobian[:, kept], state.weight, state.cost)
 
 
+def _left(hessian: FloatArray, cross: FloatArray, power: float, low: FloatArray, high: FloatArray,
+          size: float) -> float:
+    """Return what nuisances within their bounds leave of a size [half chi-square]."""
+    gradient = -size * cross
+    step = box_constrained_step(hessian, gradient, low, high)
+    return 0.5 * size ** 2 * power - float(gradient @ step - 0.5 * step @ hessian @ step)
+
+
 def _least_visible(number: Parameter, power: float, free: float, left: Callable[[float], float],
                    price: float) -> float:
     """Return the size above which an effect exceeds its tolerance and leaves `price`."""
     # `number` is the effect's first, `power` the square of its column, and `left` what is surely
     # left of a size, in halves of a chi-square; of a size of one it is at least `free`, what is
     # left without bounds. Either sign has to show.
-    # where nothing imitates it; a little less, so that rounding does not make it visible
+    # Where nothing imitates it, a little less: rounding is not to make it visible.
     least = (1.0 - _SHARE) * math.sqrt(2.0 * price / power) if power > 0.0 else math.inf
     least = max(least, number.tolerance)
 
     def of_sign(sign: float, bound: float) -> float:
+        # the root finder asks for both ends again
+        @cache
         def surplus(size: float) -> float:
             return math.log(max(left(sign * math.exp(size)), 1e-9) / price)
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 from scipy import linalg
-from simgap.fit.cholesky import factored, ROUNDING, solved
+from simgap.fit.cholesky import factored, ROUNDING, solved, solver
 from simgap.fit.least_squares import LeastSquares
 from simgap.fit.noise import with_model_error
 from simgap.fit.state import proper_precision
@@ -83,10 +83,8 @@ def _followed(problem: LeastSquares, rival: Rival, point: dict[str, float], off:
     jacobian = problem.jacobian(point, numbers, problem.residuals(point), central=False)
     precision = _precision(rival, numbers, inflated)
     known = (jacobian.T @ jacobian).astype(float) + precision
-    scale = np.sqrt(np.diag(known))
-    slopes = (off.astype(np.float32) @ jacobian).astype(float) / scale
-    factor = factored(known / np.outer(scale, scale), ROUNDING)
-    steps = solved(factor, slopes.T).T / scale
+    slopes = (off.astype(np.float32) @ jacobian).astype(float)
+    steps = solver(known)(slopes.T).T
     # summed directly: the difference of two large sums in single precision cannot resolve it
     return (np.asarray(np.sum((steps @ precision) * steps, axis=1)),
             np.asarray(off - steps @ jacobian.T))

@@ -46,6 +46,7 @@ class Rival:
         return True
 
     def covariance_of(self, names: Sequence[str]) -> FloatArray:
+        """Return the covariance of k of the values, shape (k, k)."""
         places = [self.names.index(name) for name in names]
         return self.covariance[np.ix_(places, places)]
 

@@ -41,14 +41,13 @@ def places(problem: LeastSquares, point: Mapping[str, float]) -> list[Place]:
     """Return where an unknown input may act, the likeliest first; `point` is of the nuisances."""
     evidence = _Evidence.at(problem, point)
     scales, channels = problem.machine.time_scales, problem.experiments[0].channels
-    inputs = {place: _columns(problem, point, place, evidence.residual)[0]
-              for place in problem.machine.disturbance_inputs}
     found = []  # name, part, evidence and share of the energy
-    for place, responses in inputs.items():
+    for place in problem.machine.disturbance_inputs:
+        responses, _ = _columns(problem, point, place, evidence.residual)
         weighed, share, heights = evidence.weighed(responses, _rows_of(problem), _SMOOTH)
         if (evidence.net(weighed) > problem.settings.verdict.left
                 and np.sqrt(np.mean(heights ** 2)) < place.everyday):
-            # nor is it something unknown elsewhere that this is taken for
+            # it is no gap, and the other places are judged beside it
             evidence = evidence.beside(responses, place.everyday)
         else:
             found.append((place.name, place.component, weighed, share))
