@@ -125,14 +125,3 @@ def with_bias(plan: batch.Schedule, bias: Bias) -> batch.Schedule:
     middle = np.cumsum(length) - 0.5 * length
     steps[:, batch.FIXED_BIAS] = np.where(middle < bias.at, bias.before, bias.after)
     return batch.Schedule(steps, plan.keep)
-
-
-def with_torque(plan: batch.Schedule, time: FloatArray, torque: FloatArray) -> batch.Schedule:
-    """Return a plan with a torque on the axis: times [s], values [N m], straight lines between."""
-    steps = plan.steps.copy()
-    length = steps[:, batch.LENGTH]
-    ends = np.cumsum(length)
-    left = np.interp(ends - length, time, torque)
-    steps[:, batch.TORQUE] = left
-    steps[:, batch.TORQUE_SLOPE] = (np.interp(ends, time, torque) - left) / length
-    return batch.Schedule(steps, plan.keep)

@@ -72,7 +72,6 @@ class RunSetup:
     kind: np.dtype[Any]  # of the record
     duration_s: float  # of the test
     bias: Bias  # source of the bias voltage, where the share circuit is not connected
-    wind: FloatArray | None = None  # torque on the axis at its knots [N m]; None for none
     # by number: how much later jumps of the command come [s], how much higher the mean of the
     # command is in its holes [rad/s]
     late_jumps: dict[int, float] = field(default_factory=dict)

@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from functools import lru_cache
 from typing import TypeAlias
 
-from antenna_drive.diagnosis import wind
 from antenna_drive.diagnosis.disturbances import DriveDisturbance
-from antenna_drive.diagnosis.excitation import Bias, Longest, schedule, with_bias, with_torque
+from antenna_drive.diagnosis.excitation import Bias, Longest, schedule, with_bias
 from antenna_drive.diagnosis.field_test import FieldTest
 from antenna_drive.diagnosis.modifiers import RunSetup
 from antenna_drive.diagnosis.recorded_command import RecordedCommand
@@ -17,7 +16,7 @@ from antenna_drive.parameters.records import place_of
 import numpy as np
 from simgap.machine.contract import Course
 
-# Tables that are kept: a test has one for each bias voltage, each wave and each wind.
+# Tables that are kept: a test has one for each bias voltage and each wave.
 _KEPT_PLANS = 24
 # By number: late jumps of the command [s], or other means in its holes [rad/s].
 _Numbered: TypeAlias = tuple[tuple[int, float], ...]
@@ -32,19 +31,15 @@ class Plans:
 
     def steps(self, k: int, run: RunSetup, longest: Longest) -> batch.Schedule:
         """Return the steps of a run of test k, none of which is longer than allowed."""
-        torque = () if run.wind is None else tuple(run.wind.tolist())
         return self._kept(k, longest, run.delay, tuple(run.late_jumps.items()),
-                          tuple(run.hole_means.items()), run.bias, torque)
+                          tuple(run.hole_means.items()), run.bias)
 
     def _made(self, k: int, longest: Longest, delay: float, late_jumps: _Numbered,
-              hole_means: _Numbered, bias: Bias, torque: tuple[float, ...]) -> batch.Schedule:
+              hole_means: _Numbered, bias: Bias) -> batch.Schedule:
         test = self._tests[k]
-        if torque:
-            calm = self._kept(k, longest, delay, late_jumps, hole_means, bias, ())
-            return with_torque(calm, *wind.course(np.array(torque)))
         if bias != test.bias:
             return with_bias(
-                self._kept(k, longest, delay, late_jumps, hole_means, test.bias, ()), bias)
+                self._kept(k, longest, delay, late_jumps, hole_means, test.bias), bias)
         command = test.command
         if isinstance(command, RecordedCommand):
             for number, later in late_jumps:

@@ -17,7 +17,6 @@ from antenna_drive.diagnosis.modifiers import (
     Unrecorded,
 )
 from antenna_drive.diagnosis.recorded_command import RecordedCommand
-from antenna_drive.diagnosis.wind import everyday_wind, WIDEST
 from antenna_drive.readings import Reading, READINGS
 from antenna_drive.recording.sheet import Tolerances, USUAL
 import numpy as np
@@ -44,6 +43,8 @@ TOLERANT_DRIVE = (
 
 # Frictions are warmer or colder from test to test, by this standard deviation as a share.
 _WARMTH = 0.04
+# How many deviations what differs from day to day may have.
+_WIDEST = 3.0
 _OF_A_DAY = ('plant.axis.coulomb_torque', 'motor_1.motor.coulomb_torque',
              'motor_2.motor.coulomb_torque')
 # The rms of a wind that is there every day, as a share of the axis' Coulomb friction.
@@ -147,11 +148,9 @@ def _of_a_test(k: int, test: FieldTest, tolerance: float) -> Iterator[AntennaPar
                            modifier=RecorderError('clock'))
 
     for path in _OF_A_DAY:
-        yield AntennaParameter(f'day:{path}:{test.name}', '1', -WIDEST * _WARMTH,
-                               WIDEST * _WARMTH, 0.01, _WARMTH, experiment=k,
+        yield AntennaParameter(f'day:{path}:{test.name}', '1', -_WIDEST * _WARMTH,
+                               _WIDEST * _WARMTH, 0.01, _WARMTH, experiment=k,
                                modifier=scale(path))
-    yield from everyday_wind(k, test.name, float(test.time[0]), float(test.time[-1]),
-                             everyday_wind_torque(test))
 
     if isinstance(test.command, RecordedCommand):
         command = test.command

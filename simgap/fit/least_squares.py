@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from simgap.fit.broyden import Jacobian
 from simgap.fit.levenberg_marquardt import LevenbergMarquardt
-from simgap.fit.noise import whitened
+from simgap.fit.noise import innovations, whitened
+from simgap.fit.process_noise import ProcessNoise
 from simgap.fit.robust_loss import robust_level, robust_loss, robust_weight
 from simgap.fit.state import FitState, point_of, prior_precision
 from simgap.machine.contract import FloatArray, Machine, Parameter, Point
@@ -44,10 +45,13 @@ class LeastSquares:
         # where one experiment alone counts, the others need not be simulated
         self._alone = wanted[0] if len(wanted) == 1 else None
         self._linear: dict[str, Jacobian] = {}  # derivatives by what is linear, shape (n,) each
+        self._process: dict[int, ProcessNoise] = {}  # by experiment
 
     def at_scale(self, scale: float) -> LeastSquares:
         """Return the same problem at another noise scale."""
-        return LeastSquares(self.machine, scale=scale, settings=self.settings)
+        other = LeastSquares(self.machine, scale=scale, settings=self.settings)
+        other._process = self._process
+        return other
 
     def rows(self, experiment: int) -> slice:
         """Return where an experiment's residuals lie."""
@@ -64,20 +68,37 @@ class LeastSquares:
         """Return an experiment's residuals in standard deviations, shape (n c,); 0 for none."""
         if predicted is None:
             return np.zeros(self.sizes[k])
-        return self._whitened(k, self.experiments[k].measured - predicted)
-
-    def _whitened(self, k: int, z: FloatArray) -> FloatArray:
-        experiment = self.experiments[k]
-        z = z / (self.scale * experiment.noise)
+        experiment, bound = self.experiments[k], self.settings.fit.runaway
+        z = (experiment.measured - predicted) / (self.scale * experiment.noise)
         for c, colour in enumerate(experiment.colours):
             z[:, c] = whitened(z[:, c], colour)
         z = z.ravel()
         z[~self.valid[self.rows(k)]] = 0.0
         # a prediction that diverged is a bad one, not an error
-        bound = self.settings.fit.runaway
         if not np.isfinite(z).all():
             z = np.nan_to_num(z, nan=bound, posinf=bound, neginf=-bound)
-        return np.asarray(np.clip(z, -bound, bound, out=z))
+        return self._without_process(k, np.clip(z, -bound, bound, out=z))
+
+    def whitened(self, k: int, changes: FloatArray) -> FloatArray:
+        """Return changes of readings, shape (n, c, m), as residuals have them, shape (n c, m)."""
+        return self._without_process(k, self._scaled(k, changes) / self.scale)
+
+    def _scaled(self, k: int, changes: FloatArray) -> FloatArray:
+        experiment = self.experiments[k]
+        z = changes / experiment.noise[..., np.newaxis]
+        for c, colour in enumerate(experiment.colours):
+            z[:, c] = innovations(z[:, c].T, colour).T
+        z = z.reshape(self.sizes[k], -1)
+        z[~self.valid[self.rows(k)]] = 0.0
+        return np.asarray(z)
+
+    def _without_process(self, k: int, z: FloatArray) -> FloatArray:
+        process = self.experiments[k].process
+        if process is None:
+            return z
+        if k not in self._process:
+            self._process[k] = ProcessNoise.of(self._scaled(k, process))
+        return self._process[k].whitened(z, self.scale)
 
     def residuals(self, point: dict[str, float]) -> FloatArray:
         """Return the residuals at a point, shape (n,)."""
@@ -149,12 +170,10 @@ class LeastSquares:
         """Return the derivative by a number in which the machine is linear; None for another."""
         if item.name not in self._linear:
             column = np.zeros(self.valid.size, np.float32)
-            for k, experiment in enumerate(self.experiments):
+            for k in range(len(self.experiments)):
                 if (response := self.machine.linear_response(item.name, k)) is None:
                     return None
-                # nothing follows where nothing was measured
-                change = item.step * response + 0.0 * experiment.measured
-                column[self.rows(k)] = self._whitened(k, change) / item.step
+                column[self.rows(k)] = self.whitened(k, response[..., np.newaxis])[:, 0]
             self._linear[item.name] = column
         return self._linear[item.name]
 

@@ -10,6 +10,7 @@ import math
 
 import numpy as np
 from scipy.signal import lfilter
+from simgap.fit.process_noise import without_process
 from simgap.machine.contract import Colour, Experiment, FloatArray, Machine, Point
 from simgap.settings import NoiseSettings
 
@@ -48,18 +49,20 @@ def whitened(z: FloatArray, colour: Colour) -> FloatArray:
     found = np.full(z.size, np.nan)
     there = np.isfinite(z)
     if there.all():
-        return _innovations(z, colour.pole, colour.gain) / colour.level
+        return innovations(z, colour)
     if not there.any():
         return found
     places = np.arange(z.size)
     # a short gap is bridged; what is bridged is not judged
     bridged = np.interp(places, places[there], z[there])
-    found[there] = _innovations(bridged, colour.pole, colour.gain)[there] / colour.level
+    found[there] = innovations(bridged, colour)[there]
     return found
 
 
-def _innovations(z: FloatArray, pole: float, gain: float) -> FloatArray:
-    return np.asarray(lfilter([1.0, -pole], [1.0, -pole * (1.0 - gain)], z))
+def innovations(z: FloatArray, colour: Colour) -> FloatArray:
+    """Return the innovations of gapless residuals, shape (..., n), with variance 1."""
+    pole, gain = colour.pole, colour.gain
+    return np.asarray(lfilter([1.0, -pole], [1.0, -pole * (1.0 - gain)], z)) / colour.level
 
 
 def estimated(residuals: Sequence[FloatArray], interval_s: float, slow_limit: float,
@@ -98,7 +101,7 @@ def with_noise_left(machine: Machine, point: Point, settings: NoiseSettings,
     """Return a machine with the noise that is left at a point, in stated noise at most this."""
     predicted = machine.simulate([point])[0]
     return machine.with_experiments(with_estimated_noise(
-        machine.experiments, [e.measured - p for e, p in zip(
+        machine.experiments, [without_process(e, e.measured - p, settings.clip) for e, p in zip(
             machine.experiments, predicted, strict=True) if p is not None],
         replace(settings, greatest_level=greatest_level)))
 

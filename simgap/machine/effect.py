@@ -23,7 +23,6 @@ class Parameter:
     tolerance : size up to which the model's number may be off without being wrong
     label : key and value of the label of the tests that it acts on; None for all
     least_step : of the difference quotient where the prediction is a staircase; 0 for none
-    is_linear : True if a nuisance is so small that its derivative need not be taken again in a fit
     """
 
     name: str
@@ -38,7 +37,6 @@ class Parameter:
     tolerance: float = 0.0
     label: tuple[str, str] | None = field(default=None, kw_only=True)
     least_step: float = field(default=0.0, kw_only=True)
-    is_linear: bool = field(default=False, kw_only=True)
 
 
 @dataclass(frozen=True)

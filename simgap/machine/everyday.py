@@ -7,12 +7,12 @@ No size is exactly zero. Up to the tolerance of its catalogue an effect is no fa
 and what shows and has no name would be taken for another effect. So each has a nuisance of its own
 within the tolerance, whose prior is its everyday size. What so little does is linear in the size:
 its derivative is taken once, at the model as configured and again at the best answer, and such a
-nuisance costs no run. So it is with nuisances that the machine declares as linear.
+nuisance costs no run. Inputs that are there every day, such as wind, are noise of the process.
 """
 
 from collections.abc import Collection, Iterator, Sequence
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import math
 from typing import Any
 
@@ -24,6 +24,7 @@ from simgap.machine.effect import Effect, Form, Parameter
 from simgap.machine.experiment import Experiment
 from simgap.machine.machine import DisturbanceInput, Machine
 from simgap.machine.motion import Motion, TimeScales
+from simgap.machine.pulses import process
 
 # The standard deviation of an everyday size, as a share of the tolerance.
 EVERYDAY = 0.5
@@ -31,38 +32,33 @@ _PREFIX = 'everyday:'
 
 
 def with_everyday(machine: Machine) -> Machine:
-    """Return a machine with everyday sizes; itself if it has none, and nothing that is linear."""
+    """Return a machine with everyday sizes; itself if no effect has one that is not a nuisance."""
     neutral = machine.simulate([{}])[0]
     residuals = [e.measured - predicted for e, predicted in zip(
         machine.experiments, neutral, strict=True) if predicted is not None]
-    linear = {p.name: _Linear(p, p.name) for p in machine.nuisances if p.is_linear}
+    sizes: dict[str, _Size] = {}
     # what acts in several places acts in each of them
     for effect in (item for item in machine.catalogue.values() if not item.parts):
         for form in machine.catalogue.forms(effect, machine.experiments, residuals):
             for p in _sizes(machine, form):
                 # of forms that are alike near zero the first one stands for all
-                linear.setdefault(p.name, _Linear(Parameter(
-                    _PREFIX + p.name, p.unit, -p.tolerance, p.tolerance, p.step,
-                    EVERYDAY * p.tolerance), p.name, form, effect))
-    if not linear:
+                sizes.setdefault(p.name, _Size(p, form, effect))
+    found = tuple(sizes.values())
+    if not found and not any(place.everyday for place in machine.disturbance_inputs):
         return machine
-    found = tuple(linear.values())
-    return _Everyday(machine, found, _responses(machine, found, {}))
+    return _Everyday(machine, found, _responses(machine, found, {}), process(machine, {}))
 
 
 @dataclass(frozen=True)
-class _Linear:
-    """A nuisance in which the machine counts as linear."""
+class _Size:
+    """A size of an effect that everyday machines have."""
 
     parameter: Parameter
-    name: str  # in the machine
-    form: Form | None = None  # of the effect of which it is an everyday size
-    effect: Effect | None = None
+    form: Form
+    effect: Effect
 
     def besides(self, point: Point, catalogue: Catalogue) -> Point:
         """Return a point without the effect's other forms, which exclude this one."""
-        if self.form is None or self.effect is None:
-            return point
         own = self.form.start
         others = tuple(f'{effect.id}.' for effect in catalogue.values()
                        if self.effect.id in (effect.id, *effect.parts))
@@ -70,25 +66,22 @@ class _Linear:
                 if name in own or not name.startswith(others)}
 
 
-def _responses(machine: Machine, linear: Sequence[_Linear],
+def _responses(machine: Machine, sizes: Sequence[_Size],
                point: Point) -> list[NDArray[np.floating[Any]]]:
-    """Return the derivatives by what acts in each experiment, shape (n c, m), at a point."""
-    bases = [item.besides(point, machine.catalogue) for item in linear]
+    """Return the derivatives by sizes, with the shapes of their forms, at a point."""
+    bases = [size.besides(point, machine.catalogue) for size in sizes]
     unlike = {frozenset(base): base for base in bases}
     steps, stepped = [], []
-    for item, base in zip(linear, bases, strict=True):
-        p, at = item.parameter, base.get(item.name, 0.0)
+    for size, base in zip(sizes, bases, strict=True):
+        p, at = size.parameter, base.get(size.parameter.name, 0.0)
         steps.append(p.step if at + p.step <= p.high else -p.step)
-        stepped.append({**(item.form.start if item.form else {}), **base,
-                        item.name: at + steps[-1]})
-    rows: Any = machine.low_fidelity().simulate(
-        [*unlike.values(), *stepped],
-        [*[None] * len(unlike), *(item.parameter.experiment for item in linear)])
+        stepped.append({**size.form.start, **base, p.name: at + steps[-1]})
+    rows: Any = machine.low_fidelity().simulate([*unlike.values(), *stepped])
     before = dict(zip(unlike, rows, strict=False))
     return [np.stack([
         np.nan_to_num((row[k] - before[frozenset(base)][k]) / step).ravel()
-        for step, base, row in zip(steps, bases, rows[len(unlike):], strict=True)
-        if row[k] is not None], axis=-1) for k in range(len(machine.experiments))]
+        for step, base, row in zip(steps, bases, rows[len(unlike):], strict=True)], axis=-1)
+        for k in range(len(machine.experiments))]
 
 
 def everyday_of(name: str) -> str:
@@ -131,25 +124,26 @@ def _sizes(machine: Machine, form: Form) -> list[Parameter]:
 
 class _Everyday(Machine):
     """
-    A machine with nuisances in which it counts as linear, everyday sizes among them.
+    A machine with everyday sizes.
 
-    linear : the nuisances
-    responses : derivatives of the readings by those that act in each experiment, shape (n c, m)
+    sizes : those of the inner machine, m of them
+    responses : derivatives of the readings by them in each experiment, shape (n c, m)
+    process : of each experiment, see `Experiment.process`
     """
 
-    def __init__(self, inner: Machine, linear: tuple[_Linear, ...],
-                 responses: Sequence[NDArray[np.floating[Any]]]) -> None:
-        names = {item.name for item in linear}
+    def __init__(self, inner: Machine, sizes: tuple[_Size, ...],
+                 responses: Sequence[NDArray[np.floating[Any]]],
+                 process: Sequence[FloatArray | None]) -> None:
+        numbers = [Parameter(_PREFIX + p.name, p.unit, -p.tolerance, p.tolerance, p.step,
+                             EVERYDAY * p.tolerance) for p in (size.parameter for size in sizes)]
+        self._place = {p.name: j for j, p in enumerate(numbers)}
         nuisances = copy(inner.nuisances)
-        nuisances[:] = [*(p for p in inner.nuisances if p.name not in names),
-                        *(item.parameter for item in linear)]
-        super().__init__(inner.experiments, nuisances, inner.catalogue)
-        self.inner, self._linear = inner, linear
-        # by experiment: the column of each nuisance that acts in it
-        self._columns = [{name: j for j, name in enumerate(
-            item.parameter.name for item in linear if item.parameter.experiment in (None, k))}
-            for k in range(len(inner.experiments))]
-        self._own = {item.parameter.name for item in linear}
+        nuisances.extend(numbers)
+        super().__init__([
+            replace(e, process=None if part is None else part[:e.time.size])
+            for e, part in zip(inner.experiments, process, strict=True)],
+            nuisances, inner.catalogue)
+        self.inner, self._sizes = inner, sizes
         # single precision: they are read at every run
         self._responses: list[NDArray[np.floating[Any]]] = [
             np.ascontiguousarray(item, np.float32) for item in responses]
@@ -158,45 +152,46 @@ class _Everyday(Machine):
         self.diagram, self.advice, self.words = inner.diagram, inner.advice, inner.words
         self.planning = inner.planning
 
-    def _inner_point(self, point: Point) -> dict[str, float]:
-        return {name: value for name, value in point.items() if name not in self._own}
+    def _parted(self, point: Point) -> tuple[dict[str, float], FloatArray]:
+        """Return a point in the inner machine's names, and the everyday sizes, shape (m,)."""
+        return ({name: value for name, value in point.items() if name not in self._place},
+                np.array([point.get(name, 0.0) for name in self._place]))
 
-    def _with(self, readings: FloatArray, experiment: int, point: Point) -> FloatArray:
-        """Return readings with what the linear nuisances add."""
-        sizes = np.array([point.get(name, 0.0) for name in self._columns[experiment]], np.float32)
+    def _with(self, readings: FloatArray, experiment: int, sizes: FloatArray) -> FloatArray:
+        """Return readings with what the everyday sizes add."""
         if not sizes.any():
             return readings
         # most runs differ in other numbers
         known, added = self._last.get(experiment, (b'', readings))
         if known != (same := sizes.tobytes()):
-            added = np.asarray(self._responses[experiment] @ sizes,
+            added = np.asarray(self._responses[experiment] @ sizes.astype(np.float32),
                                np.float64).reshape(readings.shape)
             self._last[experiment] = same, added
         return np.asarray(readings + added)
 
     def predict(self, point: Point, experiment: int) -> FloatArray:
-        return self._with(self.inner.predict(self._inner_point(point), experiment), experiment,
-                          point)
+        inner, sizes = self._parted(point)
+        return self._with(self.inner.predict(inner, experiment), experiment, sizes)
 
     def simulate(self, points: Sequence[Point], only: Sequence[int | None] | None = None,
                  until: float = math.inf) -> list[list[FloatArray | None]]:
-        rows = self.inner.simulate(list(map(self._inner_point, points)), only, until)
-        return [[None if values is None else self._with(values, k, point)
+        parted = [self._parted(point) for point in points]
+        rows = self.inner.simulate([inner for inner, _ in parted], only, until)
+        return [[None if values is None else self._with(values, k, sizes)
                  for k, values in enumerate(row)]
-                for point, row in zip(points, rows, strict=True)]
+                for (_, sizes), row in zip(parted, rows, strict=True)]
 
     def linear_response(self, name: str, experiment: int) -> FloatArray | None:
-        if name not in self._own:
+        if (place := self._place.get(name)) is None:
             return None
-        shape = self.experiments[experiment].measured.shape
-        place = self._columns[experiment].get(name)
-        return np.zeros(shape) if place is None else np.asarray(
-            self._responses[experiment][:, place], np.float64).reshape(shape)
+        return np.asarray(self._responses[experiment][:, place], np.float64).reshape(
+            self.experiments[experiment].measured.shape)
 
     def simulate_disturbed(self, point: Point, place: DisturbanceInput,
                            course: Course) -> list[FloatArray]:
-        return [self._with(values, k, point) for k, values in enumerate(
-            self.inner.simulate_disturbed(self._inner_point(point), place, course))]
+        inner, sizes = self._parted(point)
+        return [self._with(values, k, sizes) for k, values in enumerate(
+            self.inner.simulate_disturbed(inner, place, course))]
 
     @property
     def time_scales(self) -> TimeScales:
@@ -209,9 +204,10 @@ class _Everyday(Machine):
         if inner is self.inner:
             return self
         # a truncated machine has the first part of each test
-        return _Everyday(inner, self._linear, [
+        return _Everyday(inner, self._sizes, [
             response[:e.measured.size] for e, response in zip(
-                inner.experiments, self._responses, strict=True)])
+                inner.experiments, self._responses, strict=True)],
+            [e.process for e in self.experiments])
 
     def truncated(self) -> Machine:
         return self._around(self.inner.truncated())
@@ -226,8 +222,9 @@ class _Everyday(Machine):
         return self._around(self.inner.without(effects))
 
     def with_noise_at(self, point: Point) -> Machine:
-        return self._around(self.inner.with_noise_at(self._inner_point(point)))
+        return self._around(self.inner.with_noise_at(self._parted(point)[0]))
 
     def linearised_at(self, point: Point) -> Machine:
-        return _Everyday(self.inner, self._linear, _responses(
-            self.inner, self._linear, self._inner_point(point)))
+        here = self._parted(point)[0]
+        return _Everyday(self.inner, self._sizes, _responses(self.inner, self._sizes, here),
+                         process(self.inner, here))

@@ -50,7 +50,8 @@ def concluded(machine: Machine, progress: Callable[[float, str], None], threads:
     places = unknown_input.places(LeastSquares(stated, settings=settings), point)
     decision = verdict.decide(found, places, enough(found.problem))
     if decision.unknown >= settings.verdict.partly:
-        # a place is not to blame for what pulses cannot follow
+        # a place is not to blame for what pulses cannot follow, nor for more than its everyday
+        machine = machine.with_experiments([replace(e, process=None) for e in machine.experiments])
         places = unknown_input.places(LeastSquares(machine, settings=settings), point)
     return Conclusion(found, reach, places, _deviating(found, reach), decision)
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from simgap.fit import residual_statistics as statistics
 from simgap.fit.least_squares import LeastSquares
+from simgap.fit.process_noise import without_process
 from simgap.fit.state import FitState
 
 
@@ -48,7 +49,8 @@ def remainders(problem: LeastSquares, state: FitState,
         for experiment, values in zip(problem.experiments, predicted, strict=True):
             assert values is not None
             there = np.isfinite(experiment.measured[:, c]) & np.isfinite(values[:, c])
-            gaps.append((experiment.measured[:, c] - values[:, c])[there])
+            gaps.append(without_process(experiment, experiment.measured - values,
+                                        problem.settings.noise.clip)[there, c])
             level = experiment.colours[c].level if experiment.colours else 1.0
             noises.append(level * experiment.noise[there, c])
         gap, noise = np.concatenate(gaps), np.concatenate(noises)

@@ -4,17 +4,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 import math
 
 import numpy as np
 from scipy import linalg
 from simgap.fit.least_squares import LeastSquares
-from simgap.fit.noise import whitened
 from simgap.fit.state import prior_precision
-from simgap.machine.contract import DisturbanceInput, Experiment, FloatArray, TimeScales
+from simgap.machine.contract import DisturbanceInput, FloatArray
+from simgap.machine.pulses import pulse_responses, root
 
 # Variances of the input over that of the noise that are tried, and times within which it changes,
 # in pulses.
@@ -39,21 +38,14 @@ class Place:
 
 def places(problem: LeastSquares, point: Mapping[str, float]) -> list[Place]:
     """Return where an unknown input may act, the likeliest first; `point` is of the nuisances."""
-    evidence = _Evidence.at(problem, point)
-    scales, channels = problem.machine.time_scales, problem.experiments[0].channels
-    found = []  # name, part, evidence and share of the energy
-    for place in problem.machine.disturbance_inputs:
-        responses, _ = _columns(problem, point, place, evidence.residual)
-        weighed, share, heights = evidence.weighed(responses, _rows_of(problem), _SMOOTH)
-        if (evidence.net(weighed) > problem.settings.verdict.left
-                and np.sqrt(np.mean(heights ** 2)) < place.everyday):
-            # it is no gap, and the other places are judged beside it
-            evidence = evidence.beside(responses, place.everyday)
-        else:
-            found.append((place.name, place.component, weighed, share))
+    evidence, channels = _Evidence.at(problem, point), problem.experiments[0].channels
+    # name, part, evidence and share of the energy
+    found = [(place.name, place.component, *evidence.weighed(
+        _columns(problem, point, place)[0], _SMOOTH)[:2])
+        for place in problem.machine.disturbance_inputs]
     found += [(f'reading of {channel}', channel, *evidence.weighed(
-        [_pulses_of_reading(experiment, c, scales) for experiment in problem.experiments],
-        _rows_of(problem, c))[:2]) for c, channel in enumerate(channels)]
+        [_of_reading(problem, k, c) for k in range(len(problem.experiments))])[:2])
+        for c, channel in enumerate(channels)]
     # what repeats itself too fast for a pulse, such as a hum, lies in its reading
     most = 2.0 * max(share for *_, share in found)
     repeated = [(f'reading of {channel}', channel, *evidence.repeated(c, problem))
@@ -67,8 +59,8 @@ def courses(problem: LeastSquares, point: Mapping[str, float],
             place: DisturbanceInput) -> list[tuple[FloatArray, FloatArray]]:
     """Return what would have to enter at a place, by test: times [s] and values, (m,) each."""
     evidence = _Evidence.at(problem, point)
-    responses, times = _columns(problem, point, place, evidence.residual)
-    _, _, heights = evidence.weighed(responses, _rows_of(problem), _SMOOTH)
+    responses, times = _columns(problem, point, place)
+    _, _, heights = evidence.weighed(responses, _SMOOTH)
     found, first = [], 0
     for moments in times:
         found.append((moments, heights[first:first + moments.size]))
@@ -76,25 +68,12 @@ def courses(problem: LeastSquares, point: Mapping[str, float],
     return found
 
 
-def _columns(problem: LeastSquares, point: Mapping[str, float], place: DisturbanceInput,
-             residual: FloatArray) -> tuple[list[FloatArray], list[FloatArray]]:
+def _columns(problem: LeastSquares, point: Mapping[str, float],
+             place: DisturbanceInput) -> tuple[list[FloatArray], list[FloatArray]]:
     """Return the response to each pulse at a place, and when each pulse has its peak [s]."""
     # Both are for each experiment; responses have the shape (n c, pulses), peaks (pulses,).
-    here, scales = dict(point), problem.machine.time_scales
-    responses: list[list[FloatArray]] = [[] for _ in problem.experiments]
-    peaks: list[list[float]] = [[] for _ in problem.experiments]
-    for shift in np.arange(0.0, scales.response_s - 0.5 * scales.pulse_s, scales.pulse_s):
-        disturbed = problem.machine.simulate_disturbed(
-            here, place, partial(_comb, shift=float(shift), scales=scales))
-        for k, experiment in enumerate(problem.experiments):
-            change = (residual[problem.rows(k)] - problem.standardised(k, disturbed[k])).reshape(
-                experiment.measured.shape)
-            for start, response in _responses(experiment, change, float(shift), scales):
-                responses[k].append(response)
-                peaks[k].append(start + scales.pulse_s)
-    order = [np.argsort(moments) for moments in peaks]
-    return ([np.array(columns).T[:, i] for columns, i in zip(responses, order, strict=True)],
-            [np.array(moments)[i] for moments, i in zip(peaks, order, strict=True)])
+    responses, peaks = pulse_responses(problem.machine, dict(point), place)
+    return [problem.whitened(k, item) for k, item in enumerate(responses)], peaks
 
 
 def components(found: Sequence[Place], caution: float) -> dict[str, float]:
@@ -109,53 +88,17 @@ def components(found: Sequence[Place], caution: float) -> dict[str, float]:
     return {name: value / total for name, value in weight.items()}
 
 
-def _starts(shift: float, end: float, scales: TimeScales) -> Iterator[tuple[float, float]]:
-    """Yield when each pulse of a comb begins [s], and its sign."""
-    for i, start in enumerate(np.arange(shift, end, scales.response_s)):
-        yield float(start), 1.0 if i % 2 == 0 else -1.0
-
-
-def _comb(time: FloatArray, shift: float, scales: TimeScales) -> FloatArray:
-    """Return pulses of alternating sign, the first beginning at `shift` [s]."""
-    rise = scales.pulse_s
-    value = np.zeros_like(time)
-    for start, sign in _starts(shift, float(time[-1]) + 1.0, scales):
-        value += sign * np.maximum(0.0, 1.0 - np.abs(time - start - rise) / rise)
-    return value
-
-
-def _responses(experiment: Experiment, change: FloatArray, shift: float,
-               scales: TimeScales) -> Iterator[tuple[float, FloatArray]]:
-    """Yield start and response of each pulse of a comb, without the rest of earlier pulses."""
-    end = float(experiment.time[-1]) - 2.0 * scales.pulse_s
-    for start, sign in _starts(shift, end, scales):
-        first, last = np.searchsorted(experiment.time, [start, start + scales.response_s])
-        if first == last:
-            continue  # before the first sample
-        response = np.zeros_like(change)
-        response[first:last] = sign * (change[first:last] - change[first])
-        yield start, response.ravel()
-
-
-def _pulses_of_reading(experiment: Experiment, channel: int, scales: TimeScales) -> FloatArray:
-    """Return pulses of a reading itself, one in each column, shape (n, pulses)."""
+def _of_reading(problem: LeastSquares, k: int, channel: int) -> FloatArray:
+    """Return pulses of a reading itself, one in each column, shape (n c, pulses)."""
+    experiment, scales = problem.experiments[k], problem.machine.time_scales
     # the cost grows with the third power of their number
     first, last = float(experiment.time[0]), float(experiment.time[-1])
     rise = max(scales.pulse_s, (last - first) / _MOST_PULSES)
     starts = np.arange(first, last - 2.0 * rise, rise)
-    pulses = np.maximum(0.0, 1.0 - np.abs(experiment.time[:, np.newaxis] - starts - rise) / rise)
-    if experiment.colours:
-        pulses = np.array([whitened(pulse, experiment.colours[channel]) for pulse in pulses.T]).T
-    return pulses
-
-
-def _rows_of(problem: LeastSquares, channel: int | None = None) -> list[slice]:
-    """Return where the residuals of each test lie, or those of one channel in it."""
-    whole = [problem.rows(k) for k in range(len(problem.experiments))]
-    if channel is None:
-        return whole
-    return [slice(rows.start + channel, rows.stop, len(experiment.channels))
-            for rows, experiment in zip(whole, problem.experiments, strict=True)]
+    pulses = np.zeros((*experiment.measured.shape, starts.size))
+    pulses[:, channel] = experiment.noise[:, channel, np.newaxis] * np.maximum(
+        0.0, 1.0 - np.abs(experiment.time[:, np.newaxis] - starts - rise) / rise)
+    return problem.whitened(k, pulses)
 
 
 class _Evidence:
@@ -172,40 +115,33 @@ class _Evidence:
             1.0, bound / np.maximum(np.abs(residual), 1e-12)), 0.0) / level ** 2
         nuisances = problem.machine.nuisances
         jacobian = problem.jacobian(here, nuisances, residual, central=False).astype(float)
+        # what is quieter than the noise that is stated is no gap
         stated = np.concatenate([np.tile([colour.level for colour in e.colours]
                                          or np.ones(len(e.channels)), e.time.size)
                                  for e in problem.experiments])
-        power = float(np.mean((stated * residual)[problem.valid] ** 2))
-        return cls(residual, power, weight, jacobian, prior_precision(nuisances))
+        loud = min(1.0, float(np.mean((stated * residual)[problem.valid] ** 2)))
+        return cls(residual, loud, weight, jacobian, prior_precision(nuisances))
 
-    def __init__(self, residual: FloatArray, power: float, weight: FloatArray,
+    def __init__(self, residual: FloatArray, loud: float, weight: FloatArray,
                  nuisances: FloatArray, prior: FloatArray) -> None:
         self.residual, self._weight = residual, weight
-        self._nuisances, self._prior = nuisances, prior
+        self._loud = loud
         weighted = nuisances * weight[:, np.newaxis]
         square = nuisances.T @ weighted + np.diag(prior)
         self._inverse = np.linalg.pinv(square, hermitian=True)
         self._slope = weighted.T @ residual
         self._weighted = weighted
-        whole = float(residual @ (weight * residual))
-        self._energy = whole - float(self._slope @ self._inverse @ self._slope)
-        # `power` is that of the residual in stated noise; what is quieter than that is no gap
-        self._power, self._loud = power, min(1.0, power * self._energy / whole)
+        self._energy = float(residual @ (weight * residual)
+                             - self._slope @ self._inverse @ self._slope)
         self._count = float(np.count_nonzero(weight))
 
-    def beside(self, responses: Sequence[FloatArray], size: float) -> _Evidence:
-        """Return that beside an input of this standard deviation."""
-        columns = linalg.block_diag(*responses)
-        return _Evidence(self.residual, self._power, self._weight,
-                         np.hstack([self._nuisances, columns]),
-                         np.append(self._prior, np.full(columns.shape[1], size ** -2.0)))
-
-    def weighed(self, responses: Sequence[FloatArray], slices: Sequence[slice],
-                smooth: Sequence[float] = (0.0,)) -> tuple[float, float, FloatArray]:
+    def weighed(self, responses: Sequence[FloatArray], smooth: Sequence[float] = (0.0,),
+                ) -> tuple[float, float, FloatArray]:
         """Return the evidence for an input, the explained share of the energy, and its factors."""
-        # `slices` are the rows of the responses; `smooth` has times of change, in pulses
-        squares, slopes, crosses = [], [], []
-        for columns, rows in zip(responses, slices, strict=True):
+        # `smooth` has times of change, in pulses
+        squares, slopes, crosses, end = [], [], [], 0
+        for columns in responses:
+            rows = slice(end, end := end + len(columns))
             weighted = columns * self._weight[rows, np.newaxis]
             squares.append(columns.T @ weighted)
             slopes.append(weighted.T @ self.residual[rows])
@@ -219,7 +155,7 @@ class _Evidence:
         if size <= 0.0:
             return best, share, heights
         for pulses in smooth:
-            roots = [_root(columns.shape[1], pulses) for columns in responses]
+            roots = [root(columns.shape[1], pulses) for columns in responses]
             own = _rows(roots, _rows(roots, square / size).T)
             values, vectors = np.linalg.eigh(0.5 * (own + own.T))
             values = np.maximum(values, 0.0)
@@ -243,13 +179,12 @@ class _Evidence:
     def repeated(self, channel: int, problem: LeastSquares) -> tuple[float, float]:
         """Return the evidence that a reading repeats itself within a pulse, and its share."""
         products, count = np.zeros(_LAGS + 1), 0
-        left_over = self.residual - self._nuisances @ (self._inverse @ self._slope)
         for k, experiment in enumerate(problem.experiments):
             rows = problem.rows(k)
             if experiment.channels[channel] in experiment.quantised:
                 continue
             shape = experiment.measured.shape
-            z = (left_over[rows] * np.sqrt(self._weight[rows])).reshape(shape)[:, channel]
+            z = (self.residual[rows] * np.sqrt(self._weight[rows])).reshape(shape)[:, channel]
             products += [float(z[lag:] @ z[:z.size - lag]) for lag in range(_LAGS + 1)]
             count += int(np.count_nonzero(z))
         if count < 10 * _LAGS:
@@ -265,11 +200,3 @@ def _rows(roots: Sequence[FloatArray], matrix: FloatArray) -> FloatArray:
     ends = np.cumsum([len(root) for root in roots])
     return np.concatenate([root.T @ part for root, part in zip(
         roots, np.split(matrix, ends[:-1]), strict=True)])
-
-
-def _root(count: int, pulses: float) -> FloatArray:
-    """Return a root of the covariance of `count` heights that change within so many pulses."""
-    if not pulses:
-        return np.eye(count)
-    apart = np.abs(np.subtract.outer(np.arange(count), np.arange(count)))
-    return np.asarray(np.linalg.cholesky(np.exp(-apart / pulses) + 1e-9 * np.eye(count)))
