@@ -96,8 +96,8 @@ class VerdictSettings:
     wide: float = _at(
         0.4, '1', 'half an interval, as a share of its value, from which it is said to be wide')
     left: float = _at(
-        0.09, '1', 'share of what the best leaves that an unknown input explains, net of what its '
-        'freedom costs, from which unknown is likelier than not', WILD)
+        0.07, '1', 'share of the gap that an unknown input explains beside the best, net of what '
+        'its freedom costs, from which unknown is likelier than not', WILD)
     left_width: float = _at(0.2, '1', 'how sharply, in the logarithm of the share', WILD)
     least_unknown: float = _at(0.03, 'probability', 'least probability of unknown', YARDSTICK)
     most_unknown: float = _at(0.85, 'probability', 'greatest probability of unknown', YARDSTICK)

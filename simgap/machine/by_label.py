@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A machine whose effects may differ between labels of its tests."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 import math
 from statistics import fmean
@@ -12,8 +12,7 @@ from simgap.machine.catalogue import Catalogue
 from simgap.machine.effect import Effect, Form, Parameter
 from simgap.machine.everyday import as_configured
 from simgap.machine.experiment import Experiment
-from simgap.machine.machine import DisturbanceInput, Machine
-from simgap.machine.motion import Motion, TimeScales
+from simgap.machine.machine import DisturbanceInput, Machine, Wrapped
 from simgap.machine.nuisances import Nuisances
 
 # The values of a label by test; '' where a test lacks the label.
@@ -146,15 +145,13 @@ class _LabelledNuisances(Nuisances):
         return self._inner.absorb(point, self._labels.mean(removed))
 
 
-class ByLabel(Machine):
+class ByLabel(Wrapped):
     """A machine with a further form of each effect for each label of its tests."""
 
     def __init__(self, inner: Machine, labels: Labels) -> None:
-        super().__init__(inner.experiments, _LabelledNuisances(inner.nuisances, labels),
+        super().__init__(inner, inner.experiments, _LabelledNuisances(inner.nuisances, labels),
                          _LabelledCatalogue(inner.catalogue, labels))
-        self.inner, self.labels = inner, labels
-        self.disturbance_inputs, self.notes = inner.disturbance_inputs, inner.notes
-        self.diagram, self.advice, self.words = inner.diagram, inner.advice, inner.words
+        self.labels = labels
 
     def predict(self, point: Point, experiment: int) -> FloatArray:
         return self.inner.predict(self.labels.in_test(point, experiment), experiment)
@@ -183,34 +180,15 @@ class ByLabel(Machine):
         return [self.inner.simulate_disturbed(self.labels.in_test(point, k), place, course)[k]
                 for k in range(len(self.experiments))]
 
-    @property
-    def time_scales(self) -> TimeScales:
-        return self.inner.time_scales
-
-    def motion(self, experiment: int) -> Motion:
-        return self.inner.motion(experiment)
-
-    def _around(self, inner: Machine) -> Machine:
+    def around(self, inner: Machine) -> Machine:
         return self if inner is self.inner else ByLabel(inner, self.labels)
-
-    def truncated(self) -> Machine:
-        return self._around(self.inner.truncated())
-
-    def low_fidelity(self) -> Machine:
-        return self._around(self.inner.low_fidelity())
-
-    def with_experiments(self, experiments: Sequence[Experiment]) -> Machine:
-        return self._around(self.inner.with_experiments(experiments))
-
-    def without(self, effects: Collection[str]) -> Machine:
-        return self._around(self.inner.without(effects))
 
     def with_noise_at(self, point: Point) -> Machine:
         """Return the machine with the noise of a motion; sizes count with their mean."""
-        return self._around(self.inner.with_noise_at(self.labels.mean(point)))
+        return self.around(self.inner.with_noise_at(self.labels.mean(point)))
 
     def linearised_at(self, point: Point) -> Machine:
-        return self._around(self.inner.linearised_at(self.labels.mean(point)))
+        return self.around(self.inner.linearised_at(self.labels.mean(point)))
 
     def linear_response(self, name: str, experiment: int) -> FloatArray | None:
         return self.inner.linear_response(name, experiment)

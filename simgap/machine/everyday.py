@@ -10,7 +10,7 @@ its derivative is taken once, at the model as configured and again at the best a
 nuisance costs no run. Inputs that are there every day, such as wind, are noise of the process.
 """
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 import math
@@ -21,9 +21,7 @@ from numpy.typing import NDArray
 from simgap.machine.arrays import Course, FloatArray, Point
 from simgap.machine.catalogue import Catalogue
 from simgap.machine.effect import Effect, Form, Parameter
-from simgap.machine.experiment import Experiment
-from simgap.machine.machine import DisturbanceInput, Machine
-from simgap.machine.motion import Motion, TimeScales
+from simgap.machine.machine import DisturbanceInput, Machine, Wrapped
 from simgap.machine.pulses import process
 
 # The standard deviation of an everyday size, as a share of the tolerance.
@@ -122,7 +120,7 @@ def _sizes(machine: Machine, form: Form) -> list[Parameter]:
             if p.tolerance > 0.0 and nuisances.absorb(neutral, {p.name: p.step}) == neutral]
 
 
-class _Everyday(Machine):
+class _Everyday(Wrapped):
     """
     A machine with everyday sizes.
 
@@ -139,18 +137,15 @@ class _Everyday(Machine):
         self._place = {p.name: j for j, p in enumerate(numbers)}
         nuisances = copy(inner.nuisances)
         nuisances.extend(numbers)
-        super().__init__([
+        super().__init__(inner, [
             replace(e, process=None if part is None else part[:e.time.size])
             for e, part in zip(inner.experiments, process, strict=True)],
             nuisances, inner.catalogue)
-        self.inner, self._sizes = inner, sizes
+        self._sizes = sizes
         # single precision: they are read at every run
         self._responses: list[NDArray[np.floating[Any]]] = [
             np.ascontiguousarray(item, np.float32) for item in responses]
         self._last: dict[int, tuple[bytes, FloatArray]] = {}
-        self.disturbance_inputs, self.notes = inner.disturbance_inputs, inner.notes
-        self.diagram, self.advice, self.words = inner.diagram, inner.advice, inner.words
-        self.planning = inner.planning
 
     def _parted(self, point: Point) -> tuple[dict[str, float], FloatArray]:
         """Return a point in the inner machine's names, and the everyday sizes, shape (m,)."""
@@ -193,14 +188,7 @@ class _Everyday(Machine):
         return [self._with(values, k, sizes) for k, values in enumerate(
             self.inner.simulate_disturbed(inner, place, course))]
 
-    @property
-    def time_scales(self) -> TimeScales:
-        return self.inner.time_scales
-
-    def motion(self, experiment: int) -> Motion:
-        return self.inner.motion(experiment)
-
-    def _around(self, inner: Machine) -> Machine:
+    def around(self, inner: Machine) -> Machine:
         if inner is self.inner:
             return self
         # a truncated machine has the first part of each test
@@ -209,20 +197,8 @@ class _Everyday(Machine):
                 inner.experiments, self._responses, strict=True)],
             [e.process for e in self.experiments])
 
-    def truncated(self) -> Machine:
-        return self._around(self.inner.truncated())
-
-    def low_fidelity(self) -> Machine:
-        return self._around(self.inner.low_fidelity())
-
-    def with_experiments(self, experiments: Sequence[Experiment]) -> Machine:
-        return self._around(self.inner.with_experiments(experiments))
-
-    def without(self, effects: Collection[str]) -> Machine:
-        return self._around(self.inner.without(effects))
-
     def with_noise_at(self, point: Point) -> Machine:
-        return self._around(self.inner.with_noise_at(self._parted(point)[0]))
+        return self.around(self.inner.with_noise_at(self._parted(point)[0]))
 
     def linearised_at(self, point: Point) -> Machine:
         here = self._parted(point)[0]

@@ -156,3 +156,38 @@ class Machine(ABC):
         """
         raise NotImplementedError(f'{type(self).__name__} names disturbance_inputs '
                                   'and lacks simulate_disturbed')
+
+
+class Wrapped(Machine):
+    """A machine around an inner one, which it passes on but for what it adds."""
+
+    def __init__(self, inner: Machine, experiments: Iterable[Experiment], nuisances: Nuisances,
+                 catalogue: Catalogue) -> None:
+        super().__init__(experiments, nuisances, catalogue)
+        self.inner = inner
+        self.disturbance_inputs, self.notes = inner.disturbance_inputs, inner.notes
+        self.diagram, self.advice, self.words = inner.diagram, inner.advice, inner.words
+        self.planning = inner.planning
+
+    @abstractmethod
+    def around(self, inner: Machine) -> Machine:
+        """Return the same around another inner machine."""
+
+    @property
+    def time_scales(self) -> TimeScales:
+        return self.inner.time_scales
+
+    def motion(self, experiment: int) -> Motion:
+        return self.inner.motion(experiment)
+
+    def truncated(self) -> Machine:
+        return self.around(self.inner.truncated())
+
+    def low_fidelity(self) -> Machine:
+        return self.around(self.inner.low_fidelity())
+
+    def with_experiments(self, experiments: Sequence[Experiment]) -> Machine:
+        return self.around(self.inner.with_experiments(experiments))
+
+    def without(self, effects: Collection[str]) -> Machine:
+        return self.around(self.inner.without(effects))

@@ -16,7 +16,8 @@ def pulse_responses(machine: Machine, point: Point, place: DisturbanceInput, siz
                     ) -> tuple[list[FloatArray], list[FloatArray]]:
     """Return the responses to pulses of a size at a place, and when each has its peak [s]."""
     # Both are for each experiment; responses have the shape (n, c, pulses), peaks (pulses,).
-    scales, calm = machine.time_scales, machine.simulate([point])[0]
+    scales = machine.time_scales
+    calm = [machine.predict(point, k) for k in range(len(machine.experiments))]
     responses: list[list[FloatArray]] = [[] for _ in calm]
     peaks: list[list[float]] = [[] for _ in calm]
     for shift in np.arange(0.0, scales.response_s - 0.5 * scales.pulse_s, scales.pulse_s):
