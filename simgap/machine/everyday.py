@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from simgap.machine.arrays import Course, FloatArray, Point
 from simgap.machine.catalogue import Catalogue
 from simgap.machine.effect import Effect, Form, Parameter
+from simgap.machine.experiment import Experiment
 from simgap.machine.machine import DisturbanceInput, Machine, Wrapped
 from simgap.machine.pulses import process
 
@@ -76,10 +77,10 @@ def _responses(machine: Machine, sizes: Sequence[_Size],
         stepped.append({**size.form.start, **base, p.name: at + steps[-1]})
     rows: Any = machine.low_fidelity().simulate([*unlike.values(), *stepped])
     before = dict(zip(unlike, rows, strict=False))
-    return [np.stack([
-        np.nan_to_num((row[k] - before[frozenset(base)][k]) / step).ravel()
-        for step, base, row in zip(steps, bases, rows[len(unlike):], strict=True)], axis=-1)
-        for k in range(len(machine.experiments))]
+    return [np.reshape([
+        np.nan_to_num((row[k] - before[frozenset(base)][k]) / step)
+        for step, base, row in zip(steps, bases, rows[len(unlike):], strict=True)],
+        (len(sizes), e.measured.size)).T for k, e in enumerate(machine.experiments)]
 
 
 def everyday_of(name: str) -> str:
@@ -189,13 +190,18 @@ class _Everyday(Wrapped):
             self.inner.simulate_disturbed(inner, place, course))]
 
     def around(self, inner: Machine) -> Machine:
-        if inner is self.inner:
-            return self
+        return self if inner is self.inner else self._around(
+            inner, [e.process for e in self.experiments])
+
+    def _around(self, inner: Machine, process: Sequence[FloatArray | None]) -> Machine:
         # a truncated machine has the first part of each test
         return _Everyday(inner, self._sizes, [
             response[:e.measured.size] for e, response in zip(
-                inner.experiments, self._responses, strict=True)],
-            [e.process for e in self.experiments])
+                inner.experiments, self._responses, strict=True)], process)
+
+    def with_experiments(self, experiments: Sequence[Experiment]) -> Machine:
+        return self._around(self.inner.with_experiments(experiments),
+                            [e.process for e in experiments])
 
     def with_noise_at(self, point: Point) -> Machine:
         return self.around(self.inner.with_noise_at(self._parted(point)[0]))

@@ -76,7 +76,7 @@ def ranked(found: Found, unknown: float) -> list[Answer]:
 def unknown_probability(found: Found, places: Sequence[Place]) -> float:
     """Return the probability that something outside the catalogue is at work."""
     settings, evidence = found.problem.settings.verdict, found.evidence
-    # a named effect has an error of form in proportion to what it does: of that, too, it is a share
+    # of the whole gap, because the form of a named effect errs in proportion to what it does
     whole = 1.0 + 2.0 * evidence.gain / (evidence.temperature * evidence.samples)
     explained = max((place.explained for place in places), default=0.0) / whole
     beyond = math.log(max(explained, 1e-9) / settings.left) / settings.left_width

@@ -158,3 +158,20 @@ def test_the_next_test_is_told_where_something_without_a_name_may_act(
     assert sum(unnamed.values()) == pytest.approx(unknown, abs=0.02)
     # a verdict without a gap names no place
     assert bool(found['where']) == bool(found['may_enter_at']) == (word == 'unknown_effect')
+
+
+class PushedEveryDay(TwoLags):
+    """The same, with a force on the left every day."""
+
+    disturbance_inputs = (DisturbanceInput('force on the left', 'left', everyday=0.5,
+                                           everyday_s=0.5), TwoLags.disturbance_inputs[1])
+
+
+def test_a_force_of_every_day_is_no_gap_and_more_of_it_is_found_in_its_place() -> None:
+    little = 0.25 * smooth(5), 0.0 * TIME
+    assert diagnose(TwoLags(*little)).word == 'unknown_effect'
+    assert diagnose(PushedEveryDay(*little)).word == 'no_gap'
+    elsewhere = diagnose(PushedEveryDay(*reversed(little)))
+    assert (elsewhere.word, elsewhere.may_enter_at[0].component) == ('unknown_effect', 'right')
+    more = diagnose(PushedEveryDay(3.0 * smooth(5), 0.0 * TIME))
+    assert (more.word, more.may_enter_at[0].component) == ('unknown_effect', 'left')
