@@ -113,9 +113,6 @@ class LackOfFitSettings:
 
     block: int = _at(10, 'samples', 'length of the blocks whose means are the slow part')
     lags: int = _at(20, 'samples', 'greatest lag of the autocorrelation')
-    bins: int = _at(12, '1', 'bins of a covariate')
-    least_dependence: float = _at(
-        0.02, '1', 'share of the variance from which a dependence is listed')
 
 
 @dataclass(frozen=True)

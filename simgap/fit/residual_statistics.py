@@ -1,9 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""Statistics of a residual that need no model: its power, its slow part, what it depends on."""
-
-from collections.abc import Mapping, Sequence
-from typing import Any
+"""Statistics of a residual that need no model: its power, its slow part, its correlation."""
 
 import numpy as np
 from simgap.machine.contract import FloatArray
@@ -42,37 +39,3 @@ def autocorrelation(z: FloatArray, settings: Settings = DEFAULT) -> float:
     if z.size < 3 * lags or power == 0.0:
         return 0.0
     return float(max(abs(z[lag:] @ z[:-lag]) / power for lag in range(1, lags)))
-
-
-def dependence(z: FloatArray, by: FloatArray,
-               settings: Settings = DEFAULT) -> float:
-    """Return the share of a residual's variance that a covariate explains, chance subtracted."""
-    good = np.isfinite(z) & np.isfinite(by)
-    z, by = z[good], by[good]
-    bins = settings.lack_of_fit.bins
-    if z.size < 10 * bins or np.ptp(by) == 0.0:
-        return 0.0
-    edges = np.unique(np.quantile(by, np.linspace(0.0, 1.0, bins + 1)))
-    if edges.size < 3:
-        return 0.0
-    which = np.clip(np.searchsorted(edges, by, side='right') - 1, 0, edges.size - 2)
-    total = float(np.sum((z - z.mean()) ** 2))
-    count = np.bincount(which, minlength=edges.size - 1)
-    mean = np.bincount(which, z, minlength=edges.size - 1) / np.maximum(count, 1)
-    between = float(np.sum(count * (mean - z.mean()) ** 2))
-    chance = (edges.size - 2) / z.size
-    return max(0.0, between / max(total, 1e-30) - chance)
-
-
-def dependences(channels: Sequence[str], covariates: Sequence[Mapping[str, FloatArray]],
-                residuals: Sequence[FloatArray],
-                settings: Settings = DEFAULT) -> list[dict[str, Any]]:
-    """Return what residuals, shape (n, c), depend on, of covariates, (n,); the strongest first."""
-    found = []
-    for c, channel in enumerate(channels):
-        z = np.concatenate([r[:, c] for r in residuals])
-        for name in covariates[0]:
-            share = dependence(z, np.concatenate([each[name] for each in covariates]), settings)
-            if share > settings.lack_of_fit.least_dependence:
-                found.append({'signal': channel, 'depends_on': name, 'share': share})
-    return sorted(found, key=lambda item: -float(str(item['share'])))

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a hypothesis leaves: how far that is from noise, in which signal, what it depends on."""
+"""What a hypothesis leaves: how far that is from noise, in which signal."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -69,7 +69,7 @@ def remainders(problem: LeastSquares, state: FitState,
 
 
 def residual_tests(problem: LeastSquares, state: FitState) -> dict[str, Any]:
-    """Return the residual of every signal and what it depends on, for the JSON."""
+    """Return the residual of every signal, for the JSON."""
     settings = problem.settings
     signals: dict[str, Any] = {}
     count = len(problem.experiments)
@@ -85,6 +85,4 @@ def residual_tests(problem: LeastSquares, state: FitState) -> dict[str, Any]:
                 'greatest_correlation': max(
                     statistics.autocorrelation(part[:, c], settings) for part in zs),
             }
-    covariates = [problem.machine.motion(k).covariates() for k in range(count)]
-    return {'excess_over_noise': _slow_excess(problem, state), 'signals': signals,
-            'depends_on': statistics.dependences(channels, covariates, zs, settings)}
+    return {'excess_over_noise': _slow_excess(problem, state), 'signals': signals}

@@ -3,7 +3,7 @@
 """What a diagnosis says: a record for programs, with a few lines for people and the JSON."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import asdict, dataclass, fields
 from typing import Any
 
 from simgap.inputs.plain import strict_json
@@ -68,7 +68,7 @@ class Verdict:
         return {'verdict': self.word, 'sentence': str(said(self)), **{
             name: entry for name, entry in entries.items() if entry is not None},
             'which': [vars(answer) for answer in self.which],
-            'may_enter_at': [vars(place) for place in self.may_enter_at]}
+            'may_enter_at': [asdict(place) for place in self.may_enter_at]}
 
     def to_json(self) -> str:
         """Return the JSON of docs/diagnosis.md."""

@@ -169,8 +169,10 @@ def _unknown(verdict: Verdict) -> str:
                      f'{quantity(sizes[name]["before_in_unit"], sizes[name]["unit"])} rms.')
     if verdict.may_enter_at:
         place = verdict.may_enter_at[0]
-        lines.append(f'As {place.name} it could explain {percent(place.explained)} of the gap.')
-    return ' '.join([*lines, *_when(verdict), *_law(verdict)])
+        law = f', best as a function of {place.law}' if place.law else ''
+        lines.append(f'As {place.name} it could explain {percent(place.explained)} of the gap'
+                     f'{law}.')
+    return ' '.join([*lines, *_when(verdict)])
 
 
 def _when(verdict: Verdict) -> Iterator[str]:
@@ -185,13 +187,6 @@ def _when(verdict: Verdict) -> Iterator[str]:
         force = f', with {quantity(span["size"], span["unit"])}' if 'size' in span else ''
         more = f', and {len(spans) - 1} times more' if spans[1:] else ''
         yield f'It acts {when} of {span["test"]}{force}{more}.'
-
-
-def _law(verdict: Verdict) -> Iterator[str]:
-    """Yield what the greatest remainder goes with, if with anything."""
-    for item in verdict.residual_tests['depends_on'][:1]:
-        yield (f'What is left of {item["signal"]} goes with {item["depends_on"]} '
-               f'({percent(item["share"])} of it).')
 
 
 def _effect(verdict: Verdict, effect: str,

@@ -80,7 +80,10 @@ def unknown_probability(found: Found, places: Sequence[Place]) -> float:
     whole = 1.0 + 2.0 * evidence.gain / (evidence.temperature * evidence.samples)
     explained = max((place.explained for place in places), default=0.0) / whole
     beyond = math.log(max(explained, 1e-9) / settings.left) / settings.left_width
-    share = 0.5 * (1.0 + math.tanh(0.5 * beyond))
+    # a law pays what a further effect pays
+    lawful = max((place.law.evidence for place in places if place.law),
+                 default=0.0) - evidence.further
+    share = 0.5 * (1.0 + math.tanh(0.5 * max(beyond, lawful)))
     return settings.least_unknown + (settings.most_unknown - settings.least_unknown) * share
 
 

@@ -18,7 +18,8 @@ from simgap.fit.least_squares import LeastSquares
 from simgap.machine.contract import FloatArray
 from simgap.machine.everyday import with_everyday
 from simgap.settings import DEFAULT
-from simgap.verdict.unknown_input import _Evidence, components, places
+from simgap.verdict.input_evidence import InputEvidence
+from simgap.verdict.unknown_input import components, places
 
 NOISE = np.array([0.01, 0.01, 0.0035, 0.0035, 1.5e-6, 0.01])
 
@@ -90,9 +91,9 @@ def test_evidence_is_that_of_a_normal_distribution() -> None:
     random = np.random.default_rng(1)
     columns = random.normal(size=(40, 6))
     residual = columns @ random.normal(size=6) * 1.5 + random.normal(size=40)
-    inputs = _Evidence(residual, 1.0, np.ones(40), np.zeros((40, 1)), np.ones(1))
+    inputs = InputEvidence(residual, 1.0, np.ones(40), np.zeros((40, 1)), np.ones(1))
 
-    evidence, *_ = inputs.weighed([columns])
+    evidence, *_ = inputs.of_course(*inputs.reduced([columns]), [6])
 
     def worst(size: FloatArray) -> float:
         spread = np.exp(size[0]) * (np.eye(40) + np.exp(size[1]) * columns @ columns.T)

@@ -7,9 +7,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.signal import lfilter
-from simgap.fit.residual_statistics import (
-    autocorrelation, dependence, dependences, power, slow_excess,
-)
+from simgap.fit.residual_statistics import autocorrelation, power, slow_excess
 from simgap.machine.contract import FloatArray
 
 N = 200_000
@@ -30,27 +28,6 @@ def test_an_autoregressive_residual_is_as_slow_as_theory_says(phi: float) -> Non
     mean_of_ten = (1.0 + 2.0 * np.sum((1.0 - lags / 10.0) * phi ** lags)) / 10.0
     assert slow_excess(z) == pytest.approx(10.0 * mean_of_ten / (1.0 - phi) - 1.0, rel=0.04)
     assert autocorrelation(z) == pytest.approx(phi, abs=0.01)
-
-
-def test_a_residual_that_follows_a_covariate_says_by_how_much() -> None:
-    """The share of a variance that a sign explains: a^2 / (a^2 + 1)."""
-    direction = np.sign(np.sin(np.arange(N) * 0.01))
-    for size in (0.5, 1.0, 3.0):
-        share = dependence(size * direction + WHITE, direction + 1e-6 * np.arange(N) / N)
-        assert share == pytest.approx(size ** 2 / (size ** 2 + 1.0), abs=0.01)
-    assert dependence(WHITE, direction) == 0.0
-    assert dependence(WHITE, np.ones(N)) == 0.0
-
-
-def test_dependences_are_listed_by_their_share() -> None:
-    rate, angle = np.sin(np.arange(4000) * 0.01), np.linspace(0.0, 1.0, 4000)
-    noise = np.random.default_rng(2).normal(size=(4000, 2))
-    noise[:, 0] += 3.0 * rate
-    noise[:, 1] += 2.0 * angle
-    found = dependences(('current', 'tach'), [{'rate': rate, 'angle': angle}], [noise])
-    assert [(item['signal'], item['depends_on']) for item in found[:2]] == [
-        ('current', 'rate'), ('tach', 'angle')]
-    assert found[0]['share'] == pytest.approx(4.5 / 5.5, abs=0.02)
 
 
 def test_too_short_a_residual_says_nothing() -> None:

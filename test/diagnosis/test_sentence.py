@@ -12,6 +12,7 @@ import pytest
 from simgap.machine.contract import Effect, Form, Parameter
 from simgap.next_test.design import objective_for, SEPARATE
 from simgap.next_test.rivals import Findings
+from simgap.verdict.law import Law
 from simgap.verdict.record import Named
 from simgap.verdict.sentence import headline, said
 from simgap.verdict.spoken import number, percent
@@ -29,7 +30,7 @@ LOUD = {'angle': {**QUIET['angle'], 'beyond_noise': 0.05}}
 def verdict(word: str, top: Named = FOUND, **entries: Any) -> Any:
     return SimpleNamespace(**{
         'word': word, 'which': [top], 'where': [], 'confusable': [], 'may_enter_at': [],
-        'remains': QUIET, 'planning': {}, 'residual_tests': {'depends_on': []},
+        'remains': QUIET, 'planning': {},
         'machine': SimpleNamespace(catalogue=EFFECTS, words={}),
         'how_far': {'judged': top.effects, 'per_signal': {},
                     'explained_fraction': {'value': 0.99, 'ci95': [0.97, 0.996]}}, **entries})
@@ -140,7 +141,8 @@ def test_agreement_is_not_said_beside_a_remainder_that_is_louder_than_noise() ->
 
 
 def test_unknown_says_place_size_and_when_and_what_would_settle_it() -> None:
-    place = SimpleNamespace(name='force on the carriage', component='carriage', explained=0.83)
+    place = SimpleNamespace(name='force on the carriage', component='carriage', explained=0.83,
+                            law=Law('angle', 'load', 31.0, (0.0, 1.0), (0.0, 2.0)))
     found = said(verdict(
         'unknown_effect', Named(['unknown'], 0.9, {}), may_enter_at=[place],
         where=[{'component': 'carriage', 'signal': 'angle', 'regime': 'reversal', 'share': 0.6}],
@@ -150,23 +152,20 @@ def test_unknown_says_place_size_and_when_and_what_would_settle_it() -> None:
     assert found.what == (
         'Something acts that no known effect explains, most likely in carriage; it shows most in '
         'angle (reversal). The model misses angle by 0.0432 rad rms. As force on the carriage it '
-        'could explain 83 percent of the gap.')
+        'could explain 83 percent of the gap, best as a function of angle, in proportion to load.')
     assert 'one test is not enough' in found.then and '`propose`' in found.then
 
 
 @pytest.mark.parametrize('begin, end, text', [
     (2.0, 3.5, 'from 2.00 to 3.50 s'), (2.0, None, 'from 2.00 s on'), (None, 3.5, 'until 3.50 s')])
-def test_unknown_says_when_it_acts_and_by_which_law(
+def test_unknown_says_when_it_acts(
         begin: float | None, end: float | None, text: str) -> None:
     span = {'test': 'far', 'from_s': begin, 'until_s': end}
     where = {'component': 'carriage', 'signal': 'angle', 'regime': 'stick', 'share': 0.6}
     unknown: Any = {
-        'top': Named(['unknown'], 0.9, {}), 'how_far': {'per_signal': {}},
-        'residual_tests': {'depends_on': [
-            {'signal': 'angle', 'depends_on': 'rate', 'share': 0.62}]}}
+        'top': Named(['unknown'], 0.9, {}), 'how_far': {'per_signal': {}}}
     found = said(verdict('unknown_effect', where=[{**where, 'acts': [span]}], **unknown))
-    assert found.what.endswith(f'It acts {text} of far. What is left of angle goes with rate '
-                               '(62 percent of it).')
+    assert found.what.endswith(f'It acts {text} of far.')
     # a declared model knows what is pushed, and how strongly
     pushed = {**span, 'size': 3.0, 'unit': 'N'}
     found = said(verdict('unknown_effect', where=[where], pushes=[pushed] * 3, **unknown))

@@ -51,10 +51,10 @@ FULL: dict[str, Any] = {
                     'before': 9.0, 'after': 1.25, 'unit': HOSTILE, 'before_in_unit': 0.0432,
                     'after_in_unit': None}}},
     'where': [{'component': HOSTILE, 'signal': 'dial', 'regime': 'reversal', 'share': 0.4}],
-    'may_enter_at': [{'name': HOSTILE, 'component': 'dial', 'explained': 0.3}],
+    'may_enter_at': [{'name': HOSTILE, 'component': 'dial', 'explained': 0.3,
+                      'law': {'by': HOSTILE, 'times': HOSTILE}}],
     'residual_tests': {
-        'signals': {HOSTILE: {'rms': 1.0, 'slow_excess': 0.1, 'greatest_correlation': 0.2}},
-        'depends_on': [{'signal': HOSTILE, 'depends_on': 'rate', 'share': 0.2}]},
+        'signals': {HOSTILE: {'rms': 1.0, 'slow_excess': 0.1, 'greatest_correlation': 0.2}}},
     'notes': [HOSTILE], 'seconds': 3.0,
 }
 BARE: dict[str, Any] = {

@@ -1,0 +1,141 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""How much likelier an unknown input makes what a hypothesis leaves, linear about its fit."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+import math
+
+import numpy as np
+from scipy import linalg
+from simgap.fit.least_squares import LeastSquares
+from simgap.fit.state import prior_precision
+from simgap.machine.contract import FloatArray
+from simgap.machine.pulses import root
+
+# Variances of the input over that of the noise that are tried.
+_RATIOS = np.logspace(-4.0, 4.0, 25)
+# Lags by which a reading may predict itself, whatever it is that repeats.
+_LAGS = 20
+_FIRST = np.eye(1, _LAGS)[0]
+
+
+class InputEvidence:
+    """The residual that is to be explained, with the nuisances projected out."""
+
+    @classmethod
+    def at(cls, problem: LeastSquares, point: Mapping[str, float]) -> InputEvidence:
+        """Return that of a problem whose nuisances have been fitted."""
+        here = dict(point)
+        residual = problem.residuals(here)
+        level = max(problem.noise_level(residual), 1e-9)
+        bound = problem.settings.noise.clip * level
+        weight = np.where(problem.valid, np.minimum(
+            1.0, bound / np.maximum(np.abs(residual), 1e-12)), 0.0) / level ** 2
+        nuisances = problem.machine.nuisances
+        jacobian = problem.jacobian(here, nuisances, residual, central=False).astype(float)
+        # what is quieter than the noise that is stated is no gap
+        stated = np.concatenate([np.tile([colour.level for colour in e.colours]
+                                         or np.ones(len(e.channels)), e.time.size)
+                                 for e in problem.experiments])
+        loud = min(1.0, float(np.mean((stated * residual)[problem.valid] ** 2)))
+        found = cls(residual, loud, weight, jacobian, prior_precision(nuisances))
+        # what acts every day is known to a share only, as the form of an effect is
+        bare = LeastSquares(problem.machine.with_experiments(
+            [replace(e, process=None) for e in problem.experiments]), settings=problem.settings)
+        taken = 0.5 * float(weight @ (bare.residuals(here) ** 2 - residual ** 2))
+        found.process_error = problem.settings.evidence.form_error ** 2 * max(taken, 0.0)
+        return found
+
+    def __init__(self, residual: FloatArray, loud: float, weight: FloatArray,
+                 nuisances: FloatArray, prior: FloatArray) -> None:
+        self.residual, self._weight = residual, weight
+        self._loud = loud
+        self.process_error = 0.0  # price of the form of what acts every day [half chi-square]
+        weighted = nuisances * weight[:, np.newaxis]
+        square = nuisances.T @ weighted + np.diag(prior)
+        self._inverse = np.linalg.pinv(square, hermitian=True)
+        self._slope = weighted.T @ residual
+        self._weighted = weighted
+        self._energy = float(residual @ (weight * residual)
+                             - self._slope @ self._inverse @ self._slope)
+        self._count = float(np.count_nonzero(weight))
+
+    def reduced(self, responses: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
+        """Return the normal equations of inputs without what the nuisances can do."""
+        # `responses` are those of each test to its inputs; the shapes returned are (m, m) and (m,)
+        squares, slopes, crosses, end = [], [], [], 0
+        for columns in responses:
+            rows = slice(end, end := end + len(columns))
+            weighted = columns * self._weight[rows, np.newaxis]
+            squares.append(columns.T @ weighted)
+            slopes.append(weighted.T @ self.residual[rows])
+            crosses.append(self._weighted[rows].T @ columns)
+        cross = np.concatenate(crosses, axis=1)
+        projected = cross.T @ self._inverse
+        return (linalg.block_diag(*squares) - projected @ cross,
+                np.concatenate(slopes) - projected @ self._slope)
+
+    def of_course(self, square: FloatArray, slope: FloatArray, counts: Sequence[int],
+                  smooth: Sequence[float] = (0.0,)) -> tuple[float, float, FloatArray]:
+        """Return the evidence for any course, its share of the energy, and the pulses' heights."""
+        # `counts` are the pulses of each test; `smooth` has times of change, in pulses
+        best, share, heights = 0.0, 0.0, np.zeros(len(square))
+        size = float(np.trace(square)) / len(square)
+        for pulses in smooth if size > 0.0 else ():
+            roots = [root(count, pulses) for count in counts]
+            found, explained, factors = self.weighed(
+                _rows(roots, _rows(roots, square).T), _rows(roots, slope), size)
+            if found > best:
+                best, share = found, explained
+                heights = _rows([part.T for part in roots], factors)
+        return best, share, heights
+
+    def weighed(self, square: FloatArray, slope: FloatArray, size: float,
+                ) -> tuple[float, float, FloatArray]:
+        """Return the evidence for independent inputs, their share of the energy, and factors."""
+        best, share, factors = 0.0, 0.0, np.zeros(len(square))
+        values, vectors = np.linalg.eigh(0.5 * (square + square.T) / size)
+        values = np.maximum(values, 0.0)
+        turned = vectors.T @ slope
+        along = turned ** 2 / size
+        for ratio in _RATIOS:
+            left = self._energy - float(np.sum(along / (values + 1.0 / ratio)))
+            left = max(left / self._energy, 1e-9)
+            evidence = -0.5 * (self._count * np.log(left)
+                               + float(np.sum(np.log1p(ratio * values))))
+            if evidence > best:
+                best, share = float(evidence), 1.0 - left
+                factors = vectors @ (turned / (values + 1.0 / ratio)) / size
+        return best, share, factors
+
+    def net(self, evidence: float) -> float:
+        """Return the share of the energy whose loss alone would be worth this evidence."""
+        return self._loud * (1.0 - math.exp(-2.0 * evidence / max(self._count, 1.0)))
+
+    def repeated(self, channel: int, problem: LeastSquares) -> tuple[float, float]:
+        """Return the evidence that a reading repeats itself within a pulse, and its share."""
+        products, count = np.zeros(_LAGS + 1), 0
+        for k, experiment in enumerate(problem.experiments):
+            rows = problem.rows(k)
+            if experiment.channels[channel] in experiment.quantised:
+                continue
+            shape = experiment.measured.shape
+            z = (self.residual[rows] * np.sqrt(self._weight[rows])).reshape(shape)[:, channel]
+            products += [float(z[lag:] @ z[:z.size - lag]) for lag in range(_LAGS + 1)]
+            count += int(np.count_nonzero(z))
+        if count < 10 * _LAGS:
+            return 0.0, 0.0
+        factors = linalg.solve_toeplitz(products[:-1] + 1e-9 * products[0] * _FIRST, products[1:])
+        left = float(np.clip(1.0 - factors @ products[1:] / products[0], 1e-9, 1.0))
+        evidence = -0.5 * (count * math.log(left) + _LAGS * math.log(count))
+        return max(evidence, 0.0), 1.0 - left
+
+
+def _rows(roots: Sequence[FloatArray], matrix: FloatArray) -> FloatArray:
+    """Return each test's part of a matrix or vector times the transposed root of that test."""
+    ends = np.cumsum([len(root) for root in roots])
+    return np.concatenate([root.T @ part for root, part in zip(
+        roots, np.split(matrix, ends[:-1]), strict=True)])
