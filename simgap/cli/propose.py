@@ -33,9 +33,6 @@ if TYPE_CHECKING:
     from simgap.next_test.candidate import Proposal
     from simgap.next_test.space import TestSpace
 
-_OBJECTIVES = ('separate', 'sharpen', 'detect')
-_RULES = ('d-optimal', 'random')
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_proposal_options(parser)
@@ -46,7 +43,7 @@ def add_proposal_options(parser: argparse.ArgumentParser) -> None:
     """Add what every design of a test understands."""
     parser.add_argument('verdict', nargs='?', type=Path, metavar='VERDICT',
                         help='JSON of a diagnosis; not needed with --objective detect')
-    parser.add_argument('--objective', choices=_OBJECTIVES,
+    parser.add_argument('--objective', choices=('separate', 'sharpen', 'detect'),
                         help='tell the answers apart, make numbers more certain, or find effects '
                              'at all (default: separate, or detect if no answers are open)')
     parser.add_argument('--suspect', nargs='+', default=[], metavar='EFFECT',
@@ -62,7 +59,7 @@ def add_proposal_options(parser: argparse.ArgumentParser) -> None:
                         help='tests that are simulated at once (default: 2)')
     parser.add_argument('--seed', type=int, default=0, metavar='N',
                         help='of the tests that are drawn (default: 0)')
-    parser.add_argument('--rule', choices=_RULES,
+    parser.add_argument('--rule', choices=('d-optimal', 'random'),
                         help='choose by another rule, to compare with it')
 
 
@@ -73,8 +70,8 @@ def run(arguments: argparse.Namespace) -> int:
 
 def tests_of(model: str, duration: float) -> TestSpace:
     """Return the tests that a model declares."""
-    from simgap.model import load_model, own_tests
-    return own_tests(load_model(model), duration)
+    from simgap.model import load_model, OwnTests
+    return OwnTests(load_model(model), duration)
 
 
 def proposed(arguments: argparse.Namespace, tests: Callable[[dict[str, Any]], TestSpace]) -> int:

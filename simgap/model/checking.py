@@ -12,7 +12,7 @@ from simgap.errors import UserError
 from simgap.logs.log import Log, OneTest
 from simgap.machine.check import check_machine, check_tests, idle_effects
 from simgap.machine.contract import FloatArray, Parameter
-from simgap.model.declared import Model, Numbers
+from simgap.model.declared import Model
 from simgap.model.machine import OwnMachine
 from simgap.model.response import NO_RESPONSE, StepResponse, tests_of, where_it_acts
 from simgap.verdict.spoken import quantity
@@ -60,18 +60,13 @@ def check_model(model: Model, logs: Sequence[Log]) -> Checked:
         return Checked([str(error)], [])
 
 
-def _test(machine: OwnMachine, experiment: int) -> tuple[Numbers, OneTest]:
-    log = machine.logs[experiment]
-    return machine.numbers({}, experiment), OneTest(
-        log, {name: np.zeros(log.time.size) for name in machine.model.push})
-
-
 def _unknown_numbers(machine: OwnMachine) -> Iterator[str]:
     """Yield numbers that the simulation never asks for."""
     asked: set[str] = set()
-    for k in range(len(machine.logs)):
-        numbers, test = _test(machine, k)
-        machine.simulated(numbers, test)
+    for k, log in enumerate(machine.logs):
+        numbers = machine.numbers({}, k)
+        machine.simulated(numbers, OneTest(
+            log, {name: np.zeros(log.time.size) for name in machine.model.push}))
         asked |= numbers.asked_for
     for name in machine.numbers({}, 0):
         if name not in asked:
@@ -103,7 +98,7 @@ def _idle_pushes(machine: OwnMachine) -> Iterator[str]:
     neutral = [machine.predict({}, k) for k in range(len(machine.logs))]
     for place in machine.disturbance_inputs:
         pushed = machine.simulate_disturbed({}, place, np.ones_like)
-        change = max(_rms(one - other, e.noise) for one, other, e in zip(
+        change = max(_rms((one - other) / experiment.noise) for one, other, experiment in zip(
             pushed, neutral, machine.experiments, strict=True))
         if change < NO_RESPONSE:
             name = machine.push_at(place.name)
@@ -144,8 +139,8 @@ def _told(parameter: Parameter, responses: Sequence[StepResponse]) -> Iterator[s
                'simulation, let it switch between samples, or give a larger step=')
 
 
-def _rms(change: FloatArray, noise: FloatArray) -> float:
-    return math.sqrt(float(np.nanmean((change / noise) ** 2)))
+def _rms(change: FloatArray) -> float:
+    return math.sqrt(float(np.nanmean(change ** 2)))
 
 
 def _remarks(machine: OwnMachine, compiling_s: float) -> Iterator[str]:
@@ -164,10 +159,9 @@ def _remarks(machine: OwnMachine, compiling_s: float) -> Iterator[str]:
                 yield (f'{experiment.name}: {channel}: {count} samples, too few to judge; more '
                        f'than {_LEAST_SAMPLES} are needed')
                 continue
-            gap = math.sqrt(float(np.nanmean((measured - predicted[:, j]) ** 2)))
             yield (f'{experiment.name}: {channel}: measured {np.nanmin(measured):.4g} to '
                    f'{np.nanmax(measured):.4g}, simulated {np.min(predicted[:, j]):.4g} to '
                    f'{np.max(predicted[:, j]):.4g} {experiment.units[j]}; gap before any fit '
-                   f'{gap:.3g}, noise {experiment.noise[0, j]:.3g}')
+                   f'{_rms(measured - predicted[:, j]):.3g}, noise {experiment.noise[0, j]:.3g}')
     yield (f'one run of all tests takes {run_s:.2g} s (the first one {compiling_s:.2g} s); a '
            f'diagnosis takes a few thousand, about {_RUNS * run_s / 60.0:.2g} min')

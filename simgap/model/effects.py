@@ -74,7 +74,8 @@ def _effect(item: OwnEffect) -> Effect:
         forms = [Form(form.name, tuple(_parameter(f'{item.name}.{name}', number)
                                        for name, number in form.numbers.items()))
                  for form in item.forms]
-    return Effect(item.name, item.component, item.cause, item.look, tuple(forms),
+    cause = item.cause or item.name.partition('.')[2].replace('_', ' ')
+    return Effect(item.name, item.component, cause, tuple(forms),
                   simpler=(item.simpler,) if item.simpler else ())
 
 

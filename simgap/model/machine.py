@@ -3,9 +3,11 @@
 """A model of one's own and the logs of its tests, as a `Machine` of the diagnosis."""
 
 from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 import math
 from threading import RLock
 import traceback
+from typing import Any
 
 import numpy as np
 from simgap.errors import UserError
@@ -30,7 +32,7 @@ class OwnMachine(Machine):
         self.model = model
         self.logs = [model.log(log) if model.log else log for log in logs]
         self._strides = [_stride(log, model.judged_hz) for log in self.logs]
-        self._lock = None if model.parallel else RLock()
+        self._lock: AbstractContextManager[Any] = nullcontext() if model.parallel else RLock()
         self._values = {
             **{name: item.value for name, item in (*model.base.items(), *model.per_test.items())},
             **{name: value for effect in model.effects for name, value in absent(effect)}}
@@ -70,10 +72,10 @@ class OwnMachine(Machine):
         return (self._places.get(parameter) or self._places.get(name) or ('', None))[0]
 
     def _nuisances(self) -> list[Parameter]:
-        found = [_offset(name, item, None) for name, item in self.model.base.items()
+        found = [_offset(name, item) for name, item in self.model.base.items()
                  if not item.is_known]
         for k, log in enumerate(self.logs):
-            found += [_offset(name, item, k, f'{name}[{log.name}]')
+            found += [_offset(f'{name}[{log.name}]', item, k)
                       for name, item in self.model.per_test.items() if not item.is_known]
         for name, item in self.model.readings.items():
             if item.gain > 0.0:
@@ -124,11 +126,8 @@ class OwnMachine(Machine):
     def simulated(self, numbers: Numbers, test: OneTest) -> dict[str, FloatArray]:
         """Return the model's checked readings, shape (n,) each; ModelError if it failed."""
         try:
-            if self._lock is None:
+            with self._lock:
                 found = self.model.simulate(numbers, test)
-            else:
-                with self._lock:
-                    found = self.model.simulate(numbers, test)
         except UserError:
             raise
         except Exception as error:
@@ -187,8 +186,8 @@ def _stride(log: Log, judged_hz: float | None) -> int:
     return max(1, round(1.0 / judged_hz / float(np.median(np.diff(log.time)))))
 
 
-def _offset(name: str, item: Number, experiment: int | None, full: str = '') -> Parameter:
-    return Parameter(full or name, item.unit, item.low - item.value, item.high - item.value,
+def _offset(name: str, item: Number, experiment: int | None = None) -> Parameter:
+    return Parameter(name, item.unit, item.low - item.value, item.high - item.value,
                      item.quotient_step, item.sigma, experiment, least_step=item.step)
 
 

@@ -20,7 +20,7 @@ PARTS = 6
 
 def effect(key: str) -> Effect:
     """Return an effect of one number."""
-    return Effect(key, 'string', '', '', (Form('', (Parameter(f'{key}.size', '1', -1.0, 1.0,
+    return Effect(key, 'string', '', (Form('', (Parameter(f'{key}.size', '1', -1.0, 1.0,
                                                               1e-4),)),))
 
 
