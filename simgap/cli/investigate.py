@@ -46,7 +46,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def add_investigation_options(parser: argparse.ArgumentParser) -> None:
-    """Add what every investigation understands."""
     parser.add_argument('--out', type=Path, required=True, metavar='DIR',
                         help='folder of the investigation')
     parser.add_argument('--max-tests', type=int, default=4, metavar='N',

@@ -40,7 +40,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def add_proposal_options(parser: argparse.ArgumentParser) -> None:
-    """Add what every design of a test understands."""
     parser.add_argument('verdict', nargs='?', type=Path, metavar='VERDICT',
                         help='JSON of a diagnosis; not needed with --objective detect')
     parser.add_argument('--objective', choices=('separate', 'sharpen', 'detect'),
@@ -69,7 +68,6 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def tests_of(model: str, duration: float) -> TestSpace:
-    """Return the tests that a model declares."""
     from simgap.model import load_model, OwnTests
     return OwnTests(load_model(model), duration)
 
@@ -127,16 +125,14 @@ def in_percent(data: dict[str, Any]) -> dict[str, Any]:
 
 
 def _write(path: Path, found: Proposal, space: TestSpace, data: dict[str, Any]) -> None:
-    """Write the test that was found: a test sheet, or a table of commands."""
     from simgap.next_test.proposal import lines
-    best = found.tests[0]
     heading = [f'{data["duration_s"]:g} s, at least {data["sample_rate_hz"]:g} samples per second',
                *(line.strip() for line in lines(in_percent(data)))]
     if data.get('channels'):
         shares = sorted(data['channels'].items(), key=lambda item: -item[1])
         heading.append('what tells: ' + ', '.join(
             f'{name} {100.0 * share:.0f} %' for name, share in shares if share > 0.005))
-    for place, text in space.files(best.test, path).items():
+    for place, text in space.files(found.tests[0].test, path).items():
         with replaced(place) as stream:
             if place.suffix == '.yaml':
                 stream.write(''.join(f'# {line}\n' for line in heading).encode())

@@ -102,7 +102,6 @@ class Progress:
         self._refreshed = -math.inf if self._on_terminal else self._started
 
     def __enter__(self) -> Progress:
-        """Show the line at zero."""
         self.update(0)
         return self
 

@@ -33,7 +33,6 @@ class Entry:
     whole: bool = False  # whether only whole numbers are allowed
 
     def allowed(self) -> str:
-        """Say in words what is allowed."""
         if self.choices is not None:
             return 'one of ' + ', '.join(self.choices)
         kind = 'a whole number' if self.whole else 'a number'

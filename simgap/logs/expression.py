@@ -62,11 +62,6 @@ class Expression:
     references: tuple[Reference, ...]  # the columns, each of them once
     value: _Term  # of those, in this order; ArithmeticError or ValueError if none, as 1 / 0
 
-    @classmethod
-    def of_column(cls, reference: Reference) -> Expression:
-        """Return a column as it is."""
-        return cls((reference,), operator.itemgetter(0))
-
     def bound(self, constants: Mapping[str, float]) -> Expression:
         """Return the expression with constants in the place of columns of their names."""
         left = tuple(column for column in self.references if str(column) not in constants)

@@ -23,16 +23,14 @@ _BLOCK = 4096   # rows that are turned into cells at a time
 
 def arrays(columns: Mapping[str, Any], layout: Layout, names: list[str] | None = None) -> Table:
     """Return arrays as a table: vectors are columns, shape (n, k) is a column of vectors."""
-    columns = {name: _upright(values.T if layout.transposed else values)
+    columns = {name: values.T if layout.transposed else values
                for name, values in columns.items() if values.dtype.kind in 'biuf'}
+    # MATLAB gives a second dimension to every vector
+    columns = {name: values.squeeze() if values.ndim == 2 and 1 in values.shape else values
+               for name, values in columns.items()}
     columns = {name: values for name, values in columns.items() if values.ndim in (1, 2)}
     lengths = {name: len(values) for name, values in columns.items()}
     return Table(list(columns) if names is None else names, _array_rows(columns), lengths=lengths)
-
-
-def _upright(values: Any) -> Any:
-    """Return an array without the dimension that MATLAB gives to every vector."""
-    return values.squeeze() if values.ndim == 2 and 1 in values.shape else values
 
 
 def _array_rows(columns: Mapping[str, Any]) -> Iterator[tuple[int, Sequence[Text]]]:

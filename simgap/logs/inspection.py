@@ -17,7 +17,7 @@ import numpy as np
 from simgap.logs.bags import BagTable, LOG_TIME
 from simgap.logs.channel import Channel, FloatArray, NANOSECONDS, RecordingError
 from simgap.logs.column_map import parse_map, UNITS
-from simgap.logs.mapped import read_mapped
+from simgap.logs.mapped import read_file
 from simgap.logs.suspicions import suspicions
 from simgap.logs.table import AUTO, Layout, Seen, Table, Text
 from simgap.logs.tables import kind_of, open_table
@@ -186,8 +186,8 @@ def _read(path: Path, entries: Mapping[str, Any], names: Sequence[str | int],
         while word in signals:
             word += '_'
         signals[word] = name
-    channels = read_mapped(path, parse_map({**entries, 'signals': {
-        word: {'column': name, 'unit': '1'} for word, name in signals.items()}}))
+    channels = read_file(path, parse_map({**entries, 'signals': {
+        word: {'column': name, 'unit': '1'} for word, name in signals.items()}})).channels
     return {name: (word, channels[word]) for word, name in signals.items()}
 
 

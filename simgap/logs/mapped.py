@@ -41,11 +41,6 @@ class MappedFile:
     constants: Mapping[str, float]  # that the file tells beside its table
 
 
-def read_mapped(path: str | Path, import_map: ImportMap) -> dict[str, Channel]:
-    """Return the signals that a map finds in a file, by name; errors as of `read_file`."""
-    return dict(read_file(path, import_map).channels)
-
-
 def read_file(path: str | Path, import_map: ImportMap,
               constants: Mapping[str, float] | None = None) -> MappedFile:
     """
@@ -139,8 +134,6 @@ def _check_lengths(table: Table, signals: Sequence[_Samples]) -> None:
 
 
 class _Samples:
-    """Collects the samples of one signal."""
-
     def __init__(self, path: Path, signal: SignalMap, table: Table, import_map: ImportMap) -> None:
         self.stamps, self.values = array('q'), array('d')
         self.name = ' and '.join(map(str, signal.number.references))

@@ -34,7 +34,6 @@ class ModelBench(Bench):
             place.write_text(text, encoding='utf-8')
 
     def run(self, number: int, test: Path, duration: float, out: Path) -> None:
-        """Play a test, and take its constants along, see `Bench`."""
         self._play(number, test, duration, out)
         constants = test.with_suffix('.yaml')
         if constants.exists():

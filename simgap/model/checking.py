@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is wrong with a model of one's own, found out before any fit."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 import math
 import time
@@ -14,7 +14,7 @@ from simgap.machine.check import check_machine, check_tests, idle_effects
 from simgap.machine.contract import FloatArray, Parameter
 from simgap.model.declared import Model
 from simgap.model.machine import OwnMachine
-from simgap.model.response import NO_RESPONSE, StepResponse, tests_of, where_it_acts
+from simgap.model.response import NO_RESPONSE, responses, StepResponse, where_it_acts
 from simgap.verdict.spoken import quantity
 
 # Two difference quotients with a step and twice the step differ by less than this where the
@@ -33,7 +33,6 @@ class Checked:
     remarks: Sequence[str]
 
     def summary(self) -> str:
-        """Return all that was found, and how much has to be mended."""
         return '\n'.join([
             *(f'wrong: {line}' for line in self.faults), *self.remarks,
             f'{len(self.faults)} to mend' if self.faults else 'nothing is wrong'])
@@ -61,7 +60,6 @@ def check_model(model: Model, logs: Sequence[Log]) -> Checked:
 
 
 def _unknown_numbers(machine: OwnMachine) -> Iterator[str]:
-    """Yield numbers that the simulation never asks for."""
     asked: set[str] = set()
     for k, log in enumerate(machine.logs):
         numbers = machine.numbers({}, k)
@@ -75,7 +73,6 @@ def _unknown_numbers(machine: OwnMachine) -> Iterator[str]:
 
 def _changed_inputs(machine: OwnMachine,
                     before: Sequence[Mapping[str, FloatArray]]) -> Iterator[str]:
-    """Yield columns that the simulation has written into."""
     for log, columns in zip(machine.logs, before, strict=True):
         for name, values in columns.items():
             if not np.array_equal(values, log[name], equal_nan=True):
@@ -84,7 +81,6 @@ def _changed_inputs(machine: OwnMachine,
 
 
 def _differs_in_itself(machine: OwnMachine) -> Iterator[str]:
-    """Yield tests whose readings differ from run to run."""
     for k, experiment in enumerate(machine.experiments):
         first, second = (machine.predict({}, k) for _ in range(2))
         change = float(np.nanmax(np.abs(first - second) / experiment.noise))
@@ -94,7 +90,6 @@ def _differs_in_itself(machine: OwnMachine) -> Iterator[str]:
 
 
 def _idle_pushes(machine: OwnMachine) -> Iterator[str]:
-    """Yield places where a push changes no reading, or far too much."""
     neutral = [machine.predict({}, k) for k in range(len(machine.logs))]
     for place in machine.disturbance_inputs:
         pushed = machine.simulate_disturbed({}, place, np.ones_like)
@@ -108,11 +103,10 @@ def _idle_pushes(machine: OwnMachine) -> Iterator[str]:
 def _rough(machine: OwnMachine) -> Iterator[str]:
     """Yield numbers by which the readings have no derivative, or that change nothing."""
     for parameter in machine.nuisances:
-        responses = [StepResponse.at(machine, parameter, k, {})
-                     for k in tests_of(machine, parameter)]
-        if not any(item.acts for item in responses):
+        found = list(responses(machine, parameter, {}))
+        if not any(item.acts for item in found):
             yield f'{parameter.name}: changes no reading in these tests; make it known()'
-        yield from _told(parameter, responses)
+        yield from _told(parameter, found)
 
 
 def _rough_effects(machine: OwnMachine) -> Iterator[str]:
@@ -120,18 +114,16 @@ def _rough_effects(machine: OwnMachine) -> Iterator[str]:
     for effect in machine.catalogue.values():
         form = effect.forms[0]
         for parameter in form.sizes:
-            if not any(StepResponse.at(machine, parameter, k, form.start).acts
-                       for k in tests_of(machine, parameter)):
+            if not any(item.acts for item in responses(machine, parameter, form.start)):
                 yield (f'{parameter.name}: a step of {quantity(parameter.step, parameter.unit)} '
                        'from 0 changes no reading, and a search begins there; let it act from 0 '
                        'on, or give a larger step=')
-            here = where_it_acts(form, parameter)
-            yield from _told(parameter, [StepResponse.at(machine, parameter, k, here)
-                                         for k in tests_of(machine, parameter)])
+            yield from _told(parameter, responses(
+                machine, parameter, where_it_acts(form, parameter)))
 
 
-def _told(parameter: Parameter, responses: Sequence[StepResponse]) -> Iterator[str]:
-    worst = max((item.roughness for item in responses), default=0.0)
+def _told(parameter: Parameter, found: Iterable[StepResponse]) -> Iterator[str]:
+    worst = max((item.roughness for item in found), default=0.0)
     if worst > _ROUGH:
         yield (f'{parameter.name}: the derivative of the readings by it is noise: it changes by '
                f'{100.0 * min(worst, 9.99):.0f} % where the step of '

@@ -30,8 +30,6 @@ class ModelError(UserError):
 
 @dataclass(frozen=True)
 class Number:
-    """A number of the simulation."""
-
     value: float  # as configured
     low: float  # bound; the value for a known number
     high: float  # bound; the value for a known number
@@ -44,7 +42,6 @@ class Number:
 
     @property
     def is_known(self) -> bool:
-        """Return whether the number is never fitted."""
         return self.low == self.high
 
     @property

@@ -35,15 +35,12 @@ _LEAST_ERROR = 0.01
 
 @dataclass(frozen=True, repr=False)
 class OwnVerdict(Verdict):
-    """A verdict on a declared model."""
-
     # value, configured and unit of each number of the simulation, as fitted
     numbers: Mapping[str, Any]
     # where something enters that no effect names: test, place, from_s, until_s, size and unit
     pushes: Sequence[Mapping[str, Any]]
 
     def summary(self) -> str:
-        """Return the verdict in a few lines, with what pushes and when."""
         lines = [f'  {item["test"]}: {item["place"]} {quantity(item["size"], item["unit"])} from '
                  f'{item["from_s"]:.2f} to {item["until_s"]:.2f} s'
                  for item in self.pushes[:_PUSHES]]

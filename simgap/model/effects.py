@@ -38,7 +38,6 @@ class OwnCatalogue(Catalogue):
         self._angles = angles
 
     def form_named(self, effect: Effect, name: str) -> Form:
-        """Return the form of an effect by its name; that of a ripple says its order."""
         own = self._declared[effect.id]
         if own.ripple is None:
             return super().form_named(effect, name)
@@ -49,7 +48,6 @@ class OwnCatalogue(Catalogue):
 
     def forms(self, effect: Effect, experiments: Sequence[Experiment],
               residuals: Sequence[FloatArray]) -> Sequence[Form]:
-        """Return the forms that are worth a fit: of a ripple, orders that stand out."""
         own = self._declared[effect.id]
         if own.ripple is None or own.ripple.orders:
             return effect.forms

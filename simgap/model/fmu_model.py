@@ -40,7 +40,6 @@ class FmuModel:
     longest_step_s = math.inf
 
     def __init__(self, path: Path, ports: Ports) -> None:
-        """Unpack the file, find the variables and make an instance."""
         self._path = path
         self._said = ''
         # lives as long as this object

@@ -89,14 +89,12 @@ class OwnMachine(Machine):
         return self.pushed(point, experiment, {})
 
     def predict_until(self, point: Point, experiment: int, until: float) -> FloatArray:
-        """Return the readings of a test; no more than is wanted is simulated."""
         return self.pushed(point, experiment, {}, until)
 
     def simulate_disturbed(self, point: Point, place: DisturbanceInput,
                            course: Course) -> list[FloatArray]:
         name = self.push_at(place.name)
-        size = self.model.push[name].size
-        return [self.pushed(point, k, {name: size * course(log.time)})
+        return [self.pushed(point, k, {name: self.model.push[name].size * course(log.time)})
                 for k, log in enumerate(self.logs)]
 
     def push_at(self, label: str) -> str:
@@ -137,7 +135,6 @@ class OwnMachine(Machine):
 
     @property
     def time_scales(self) -> TimeScales:
-        """Return how fast the machine is, from the time in which it settles."""
         longest = max(float(e.time[-1] - e.time[0]) for e in self.experiments)
         settles = self.model.settles_s
         if settles is None:
@@ -155,8 +152,7 @@ class OwnMachine(Machine):
         log, time = self.logs[experiment], self.experiments[experiment].time
         name, item = next(iter(self.model.readings.items()))
         position = log[item.column or name][::self._strides[experiment]]
-        rate = np.gradient(position, time)
-        return Motion(time, rate=rate, angle=position,
+        return Motion(time, rate=np.gradient(position, time), angle=position,
                       reversal_s=min(0.4, 2.0 * self.time_scales.start_s))
 
     def _experiment(self, log: Log, stride: int) -> Experiment:
@@ -197,9 +193,8 @@ def _error_of_reading(name: str, unit: str, by: float, experiment: int | None) -
 
 def _diagram(model: Model) -> Diagram:
     """Return the blocks in the order of the signal, each with a line to the next."""
-    named = [*(effect.component for effect in model.effects),
-             *(item.component for item in model.push.values())]
-    found = Diagram.of([*model.blocks, *named])
+    found = Diagram.of([*model.blocks, *(effect.component for effect in model.effects),
+                        *(item.component for item in model.push.values())])
     chain = found.blocks[:len(dict.fromkeys(model.blocks))]
     middle = 0.5 * Diagram.height
     lines = []
@@ -236,6 +231,6 @@ def _checked(found: object, readings: Mapping[str, Reading],
 
 def _place(error: Exception) -> str:
     """Return the line of the user's file that an error came from."""
-    frames = traceback.extract_tb(error.__traceback__)
-    inner = [frame for frame in frames if frame.filename != __file__]
+    inner = [frame for frame in traceback.extract_tb(error.__traceback__)
+             if frame.filename != __file__]
     return f'line {inner[0].lineno}: ' if inner else ''

@@ -122,7 +122,6 @@ class _Simulation:
     readings: Mapping[str, int]  # which output of the program each is
 
     def __call__(self, numbers: Numbers, test: OneTest) -> dict[str, FloatArray]:
-        """Return the readings of a test, had the machine these numbers."""
         time = test.time
         sampled = float(np.median(np.diff(time)))
         step = sampled / max(1, math.ceil(sampled / self.longest_step_s - _SAME))
