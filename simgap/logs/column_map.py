@@ -96,10 +96,7 @@ class KnownSignals:
     aliases: Mapping[str, str] = field(default_factory=dict)
 
 
-NO_SIGNALS = KnownSignals()
-
-
-def load_map(path: str | Path, known: KnownSignals = NO_SIGNALS) -> ImportMap:
+def load_map(path: str | Path, known: KnownSignals = KnownSignals()) -> ImportMap:
     """Read a map; ParameterError names file, key and what is allowed; known units may lack."""
     path = Path(path)
     tree = read_yaml(path)
@@ -109,7 +106,7 @@ def load_map(path: str | Path, known: KnownSignals = NO_SIGNALS) -> ImportMap:
         raise ParameterError(f'{path}: {error}') from None
 
 
-def parse_map(tree: object, known: KnownSignals = NO_SIGNALS) -> ImportMap:
+def parse_map(tree: object, known: KnownSignals = KnownSignals()) -> ImportMap:
     """Check the plain data of a map, as `load_map`; ParameterError names a wrong key."""
     top = mapping_of('the map', tree, _TOP)
     texts = {key: _text(key, top[key]) for key in _TEXT_ENTRIES if key in top}
@@ -211,18 +208,17 @@ def _signal(key: str, name: str, body: object, known: KnownSignals) -> SignalMap
     if isinstance(sign, bool) or sign not in (1, -1):
         raise ParameterError(f'{key}.sign: {quoted(plain_value(sign))} given, allowed is 1 or -1')
     written = _text(f'{key}.unit', entries.get('unit', unit or None), (*UNITS, COUNTS))
-    if written == COUNTS:
-        if 'counts_per_revolution' in numbers:
-            si, factor = 'rad', 2 * math.pi / numbers['counts_per_revolution']
-        else:  # counts of a converter: the scale says what one is
-            if 'scale' not in numbers:
-                raise ParameterError(f'{key}: counts need counts_per_revolution (an angle) or '
-                                     'scale (anything else, in SI units for each count)')
-            si, factor = unit or '1', 1.0
-    else:
+    if written != COUNTS:
         if 'counts_per_revolution' in numbers:
             raise ParameterError(f'{key}.counts_per_revolution: goes with the unit counts only')
         si, factor = UNITS[written]
+    elif 'counts_per_revolution' in numbers:
+        si, factor = 'rad', 2 * math.pi / numbers['counts_per_revolution']
+    elif 'scale' in numbers:  # counts of a converter: the scale says what one is
+        si, factor = unit or '1', 1.0
+    else:
+        raise ParameterError(f'{key}: counts need counts_per_revolution (an angle) or scale '
+                             '(anything else, in SI units for each count)')
     if unit and si != unit:
         same = [text for text, (target, _) in UNITS.items() if target == unit]
         raise ParameterError(f'{key}.unit: {quoted(written)} given, but {name} is in {unit}; '

@@ -105,7 +105,6 @@ def _lines(path: Path, entries: dict[str, Any], groups: Sequence[Seen],
 
 
 def _head(table: Table) -> list[Sequence[Text]]:
-    """Return the first rows of a table."""
     return [row for _, (_, row) in zip(range(_HEAD), table.rows)]
 
 
@@ -154,8 +153,7 @@ def _numbers(table: Table, rows: Sequence[Sequence[Text]], entries: Mapping[str,
                      for cell in cells]
             numbers = [number for text in texts if (number := _number(text, entries)) is not None]
             if len(numbers) == len(texts) and np.isfinite(numbers).any():
-                whole = name or place
-                columns[whole if label is None else f'{name}[{label}]'] = np.array(numbers)
+                columns[f'{name}[{label}]' if width else name or place] = np.array(numbers)
     return columns
 
 

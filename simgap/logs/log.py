@@ -232,18 +232,15 @@ def _joined(channel: Channel, stamps: IntArray, join: str) -> FloatArray:
 
 
 def _sheet(path: Path) -> tuple[dict[str, float], dict[str, str]]:
-    """Return constants and labels of a test sheet, if there is one."""
     if not path.is_file():
         return {}, {}
     try:
         top = mapping_of('', read_yaml(path), ('constants', 'labels'))
-        constants = mapping_of('constants', top.get('constants', {}))
-        labels = dict(parse_labels('labels', top.get('labels', {})))
-        numbers = {name: float(Entry('').check(f'constants.{name}', plain_value(  # type: ignore
-            value))) for name, value in constants.items()}
+        constants = {name: float(Entry('').check(f'constants.{name}', plain_value(  # type: ignore
+            value))) for name, value in mapping_of('constants', top.get('constants', {})).items()}
+        return constants, dict(parse_labels('labels', top.get('labels', {})))
     except ParameterError as error:
         raise LogError(f'{path}: {error}') from None
-    return numbers, labels
 
 
 def _held(values: FloatArray) -> FloatArray:

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """An FMU for co-simulation (FMI 2 or 3) as a simulation, called without a wrapper between."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping
 import ctypes
 from ctypes import c_bool, c_double, c_int, c_size_t, c_void_p

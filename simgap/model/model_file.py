@@ -23,11 +23,9 @@ _TOP = (*_PROGRAMS, 'step_s', 'inputs', 'starts', 'constants', 'base', 'per_test
 # What a number may do, in the order in which it is done. The last one is to an input.
 _ACTS = ('sets', 'scales', 'adds', 'adds_to_inverse', 'delays')
 _KINDS = ('known', 'share', 'by', 'free', 'size', 'shape')
-_OF_NUMBER = ('value', 'start', 'unit', 'step', 'tolerance')
 _OF_EFFECT = ('cause', 'simpler', 'numbers')
 _NUMBER = Entry('')
 _POSITIVE = Entry('', low=1e-12)
-_PAIR = Entry('', lengths=(2, 2))
 # A sample counts as there at a time that differs by less than this share of a step.
 _SAME = 1e-6
 
@@ -184,7 +182,7 @@ def _simulator(program: str, path: Path, ports: Ports) -> Simulator:
 
 def _number_bodies(top: Mapping[str, Any]) -> Iterator[tuple[str, str, Mapping[str, Any]]]:
     """Yield key, name and body of every number of the file."""
-    allowed = (*_KINDS, *_OF_NUMBER, *_ACTS)
+    allowed = (*_KINDS, 'value', 'start', 'unit', 'step', 'tolerance', *_ACTS)
     yield from _bodies('base', top, allowed)
     yield from _bodies('per_test', top, allowed)
     for key, _, item in _bodies('effects', top, _OF_EFFECT):
@@ -213,11 +211,9 @@ def _check_actions(actions: list[_Action], inputs: Mapping[str, str]) -> None:
         if item.act == 'delays' and item.target not in inputs:
             raise ModelError(f'{item.key}: {item.target} is no input; there are '
                              f'{", ".join(inputs) or "none"}')
-        if item.act == 'sets' and item.target in taken:
+        if item.act == 'sets' and taken.setdefault(item.target, item.key) != item.key:
             raise ModelError(f'{item.key}: {item.target}: {taken[item.target]} sets it, too; '
                              'let one of them add or scale')
-        if item.act == 'sets':
-            taken[item.target] = item.key
 
 
 def _declared(key: str, body: Mapping[str, Any], defaults: Mapping[str, float]) -> Number:
@@ -324,5 +320,5 @@ def _optional(key: str, top: Mapping[str, Any]) -> float | None:
 
 
 def _pair(key: str, value: object) -> tuple[float, float]:
-    low, high = _PAIR.check(key, value)  # type: ignore[misc, str-unpack]
+    low, high = Entry('', lengths=(2, 2)).check(key, value)  # type: ignore[misc, str-unpack]
     return float(low), float(high)
