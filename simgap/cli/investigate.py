@@ -35,8 +35,6 @@ if TYPE_CHECKING:
     from simgap.model.bench import Play
     from simgap.next_test.investigation import Bench, InvestigationPlan
 
-PAGE = 'story.html'
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('model', metavar='MODEL', help='as for simgap diagnose')
@@ -94,10 +92,11 @@ def investigated(arguments: argparse.Namespace, bench: Bench, plan: Investigatio
 
         story = Investigation(arguments.out, bench, plan, first, arguments.jobs).run(show)
     title, lead = headline(story)
-    with replaced(arguments.out / PAGE) as stream:
+    page = arguments.out / 'story.html'
+    with replaced(page) as stream:
         stream.write(render('story.html', title=title, lead=lead, story=story,
                             until=plan.until).encode())
-    give(story, arguments.json, '\n'.join([*lines(story), str(arguments.out / PAGE)]))
+    give(story, arguments.json, '\n'.join([*lines(story), str(page)]))
     return 0 if story['ended'] == DECIDED else 1
 
 

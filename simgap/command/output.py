@@ -12,7 +12,6 @@ import os
 from pathlib import Path
 import sys
 import time
-from types import TracebackType
 from typing import IO
 import warnings
 
@@ -105,8 +104,7 @@ class Progress:
         self.update(0)
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
-                 trace: TracebackType | None) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         """Leave the line complete, or as far as the work got."""
         if self._shown and self._on_terminal:
             if kind is None:

@@ -98,11 +98,7 @@ class Channel:
         return self.time_ns / NANOSECONDS
 
     def at(self, time_ns: IntArray) -> FloatArray:
-        """
-        Return values [unit] at times [ns] on straight lines between the samples, shape (m,).
-
-        RecordingError outside the samples.
-        """
+        """Return values [unit] on straight lines at times [ns], (m,); RecordingError outside."""
         if len(time_ns) == 0:
             return np.empty(0)
         if not len(self) or time_ns.min() < self.time_ns[0] or time_ns.max() > self.time_ns[-1]:

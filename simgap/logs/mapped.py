@@ -185,15 +185,14 @@ class _Samples:
     def finish(self) -> None:
         """Compute what could not be computed before all rows were there."""
         whole, rows = self._signal.number.whole, self._rows
-        if not whole or not rows:
+        if not rows:
             return
         time = (np.array(self.stamps) - self.stamps[0]) / NANOSECONDS
-        last = rows[-1][0]
         for _, numbers in rows:
             numbers += [math.nan] * len(whole)
         for k, (term, function) in enumerate(whole, 1):
             taken = np.array([self._told(line, term, numbers) for line, numbers in rows])
-            found = self._told(last, partial(function, time), taken)
+            found = self._told(rows[-1][0], partial(function, time), taken)
             for (_, numbers), value in zip(rows, found.tolist(), strict=True):
                 numbers[-k] = value
         self.values = array('d', (self._value(line, numbers) for line, numbers in rows))

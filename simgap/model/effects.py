@@ -51,9 +51,8 @@ class OwnCatalogue(Catalogue):
         own = self._declared[effect.id]
         if own.ripple is None or own.ripple.orders:
             return effect.forms
-        orders = likely_orders(experiments, residuals, self._angles(own.ripple.angle),
-                               _FOUND_ORDERS)
-        return tuple(_ripple_form(own, order) for order in orders)
+        return tuple(_ripple_form(own, order) for order in likely_orders(
+            experiments, residuals, self._angles(own.ripple.angle)))
 
 
 def absent(effect: OwnEffect) -> Iterator[tuple[str, float]]:
@@ -94,7 +93,7 @@ def _ripple_form(item: OwnEffect, order: float) -> Form:
 
 
 def likely_orders(experiments: Sequence[Experiment], residuals: Sequence[FloatArray],
-                  angles: Sequence[FloatArray], count: int) -> list[float]:
+                  angles: Sequence[FloatArray]) -> list[float]:
     """Return likely orders, half by peak and half by energy, from residuals and angles [rad]."""
     orders = np.arange(_STEP, _GREATEST + _STEP, _STEP)
     energy = np.zeros(orders.size)
@@ -108,7 +107,7 @@ def likely_orders(experiments: Sequence[Experiment], residuals: Sequence[FloatAr
     peak = (energy - usual) / np.sqrt(usual)
     found: list[float] = []
     ranks = [list(np.argsort(by)[::-1]) for by in (peak, energy)]
-    while len(found) < count:
+    while len(found) < _FOUND_ORDERS:
         order = float(orders[ranks[len(found) % 2].pop(0)])
         if order not in found:
             found.append(order)

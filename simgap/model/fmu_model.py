@@ -27,8 +27,6 @@ from simgap.model.simulator import Ports
 _NUMBERS = {'2': ('Real',), '3': ('Float64',)}
 # The greatest status with which a simulation goes on: a warning.
 _WARNING = 1
-# Does a step from a time [s] over a time [s]; False if it failed.
-_Step = Callable[[float, float], bool]
 
 
 class FmuModel:
@@ -132,8 +130,8 @@ class FmuModel:
     def _say(self, text: bytes | None) -> None:
         self._said = one_line((text or b'').decode(errors='replace'))
 
-    def _calls(self) -> tuple[Callable[..., int], Callable[..., int], _Step]:
-        """Return the functions that set the inputs, read the outputs and do a step."""
+    def _calls(self) -> tuple[Callable[..., int], Callable[..., int], Callable[..., bool]]:
+        """Return what sets the inputs, what reads the outputs, and what does a step [s], [s]."""
         library, instance = self._slave.dll, self._slave.component
         if self._version == '2':
             step2 = _function(library.fmi2DoStep, c_void_p, c_double, c_double, c_int)

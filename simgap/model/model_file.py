@@ -50,11 +50,9 @@ def load_model_file(path: Path) -> Model:
     """
     try:
         return _model(path, mapping_of('', read_yaml(path), _TOP))
-    except ParameterError as error:
+    except (ParameterError, ModelError) as error:
         text = str(error)
         raise ModelError(text if text.startswith(str(path)) else f'{path}: {text}') from None
-    except ModelError as error:
-        raise ModelError(f'{path}: {error}') from None
 
 
 def _model(path: Path, top: Mapping[str, Any]) -> Model:

@@ -90,9 +90,6 @@ def refitted(machine: Machine, hypothesis: Hypothesis) -> dict[str, float]:
 
 
 def _carried(machine: OwnMachine, test: str, point: Point) -> dict[str, float]:
-    own = {f'{name}[{log.name}]' for name in machine.model.per_test for log in machine.logs}
-    carried = {name: value for name, value in point.items() if name not in own}
-    for name in machine.model.per_test:
-        carried[f'{name}[{test}]'] = float(np.mean(
-            [point.get(f'{name}[{log.name}]', 0.0) for log in machine.logs]))
-    return carried
+    return {**point, **{f'{name}[{test}]': float(np.mean(
+        [point.get(f'{name}[{log.name}]', 0.0) for log in machine.logs]))
+        for name in machine.model.per_test}}
