@@ -184,7 +184,7 @@ class _Samples:
 
     def finish(self) -> None:
         """Compute what could not be computed before all rows were there."""
-        whole, rows = self._signal.number.whole, self._rows
+        whole, rows, self._rows = self._signal.number.whole, self._rows, []
         if not rows:
             return
         time = (np.array(self.stamps) - self.stamps[0]) / NANOSECONDS
