@@ -16,7 +16,7 @@ NOISE = 0.01
 def effect(key: str, parts: tuple[str, ...] = ()) -> Effect:
     """Return an effect of one number."""
     number = Parameter(f'{key}.pull', 'N', -5.0, 5.0, 1e-3)
-    return Effect(key, 'springs', '', '', (Form('', (number,)),), parts)
+    return Effect(key, 'springs', '', (Form('', (number,)),), parts)
 
 
 class Springs(Machine):

@@ -26,10 +26,14 @@ import argparse
 from pathlib import Path
 import shlex
 import sys
+from typing import TYPE_CHECKING
 
 from antenna_drive.cli.options import add_settings_option, parse_settings
-from simgap.cli.investigate import add_investigation_options, investigated, plan_of, PlayedBy
+from simgap.cli.investigate import add_investigation_options, investigated, plan_of, played_by
 from simgap.errors import UserError
+
+if TYPE_CHECKING:
+    from simgap.model.bench import Play
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -72,17 +76,17 @@ def run(arguments: argparse.Namespace) -> int:
     return investigated(arguments, bench, plan, first)
 
 
-def _player(arguments: argparse.Namespace) -> PlayedBy:
+def _player(arguments: argparse.Namespace) -> 'Play':
     """Return what runs a test: a command, or a drive of five nodes."""
     if arguments.by:
         if arguments.settings or arguments.real:
             raise UserError('--by: another drive has its own parameters; --real and --set are '
                             'those of the five nodes')
-        return PlayedBy(shlex.split(arguments.by), '{sheet}')
+        return played_by(shlex.split(arguments.by), '{sheet}')
     # a fault of the middleware must not end an investigation
     parse_settings(arguments.settings)
     words = [sys.executable, '-m', 'antenna_drive', 'record', '--quiet', '--play', '{sheet}',
              '--out', '{out}', '--duration', '{duration}']
     for option, given in (('--config', arguments.real), ('--set', arguments.settings)):
         words += [option, *given] if given else []
-    return PlayedBy(words, '{sheet}')
+    return played_by(words, '{sheet}')

@@ -45,7 +45,7 @@ def _effect(component: str, name: str, *forms: Form | AntennaParameter,
     named = (replace(form, parameters=tuple(
         replace(p, name=f'{key}.{p.name}') for p in form.parameters)) for form in whole)
     parts = tuple(f'{motor}.{name}' for motor in MOTORS['motors']) * (component == 'motors')
-    return Effect(key, component, words['cause'], words['look'], tuple(named), parts,
+    return Effect(key, component, words['cause'], tuple(named), parts,
                   (f'{component}.{simpler}',) * bool(simpler))
 
 

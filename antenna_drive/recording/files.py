@@ -13,7 +13,7 @@ from simgap.logs import column_map
 from simgap.logs.bags import REMEDY
 from simgap.logs.channel import RecordingError
 from simgap.logs.column_map import ImportMap, KnownSignals
-from simgap.logs.mapped import read_mapped
+from simgap.logs.mapped import read_file
 
 # What a column's unit has to be convertible to: a map's scale makes article amperes of real ones.
 DRIVE = KnownSignals('the drive', {name: unit_of(name).removeprefix('article ')
@@ -57,11 +57,11 @@ def import_file(path: str | Path, import_map: ImportMap) -> Recording:
     """
     Read a file of any kind that `tables` knows, and the test sheet NAME.yaml beside it.
 
-    Raises RecordingError: the file cannot be read as the map says, see `read_mapped`.
+    Raises RecordingError: the file cannot be read as the map says, see `read_file`.
     Raises ParameterError: NAME.yaml is no test sheet.
     """
     path = Path(path)
-    channels = read_mapped(path, import_map)
+    channels = dict(read_file(path, import_map).channels)
     beside = path.with_suffix('.yaml')
     return Recording(channels, sheet=load_sheet(beside) if beside.is_file() else TestSheet(),
                      notes={'source': path.name, 'import_map': import_map.source})

@@ -27,9 +27,9 @@ class CoolingBody(Machine):
                 for start, readings in zip(STARTS, measured, strict=True)],
             nuisances=[Parameter('rate.change', '1', -0.02, 0.02, 1e-3, prior_sigma=0.01)],
             effects=[
-                Effect('heater.step', 'heater', 'the heater comes on', 'a jump at 4 s', (
+                Effect('heater.step', 'heater', 'the heater comes on', (
                     Form('', (Parameter('heater.step.size', 'K', -1.0, 1.0, 1e-3),)),)),
-                Effect('thermometer.gain', 'thermometer', 'a wrong scale', 'one reading is off', (
+                Effect('thermometer.gain', 'thermometer', 'a wrong scale', (
                     Form('', (Parameter('thermometer.gain.size', '1', -0.5, 0.5, 1e-3),)),))])
 
     def predict(self, point: Point, experiment: int) -> FloatArray:

@@ -44,7 +44,7 @@ class ServoMachine(Machine):
             [_experiment(log, stride, noise)
              for log, stride in zip(self.logs, self._strides, strict=True)],
             [self._offset(name) for name in free],
-            [Effect(effect.id, effect.component, effect.cause, effect.look, forms)
+            [Effect(effect.id, effect.component, effect.cause, forms)
              for effect in catalogue.catalogue(without).values()
              if (forms := tuple(_absent(effect.forms, self.values)))])
 

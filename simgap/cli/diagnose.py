@@ -93,7 +93,6 @@ def diagnosed(name: str, paths: Sequence[str], arguments: argparse.Namespace) ->
 
 
 def earlier_of(path: Path | None) -> Sequence[Rival]:
-    """Return the answers of the verdict of --after."""
     return findings_of(path, planning_of(path)).rivals if path else ()
 
 
@@ -126,7 +125,6 @@ def numbers_of(option: str, texts: Sequence[str]) -> Iterator[tuple[str, float]]
 
 
 def settings_of(changes: Sequence[str]) -> Settings:
-    """Return the thresholds with what was given changed."""
     from simgap.settings import DEFAULT
     settings = DEFAULT
     known = {name: value for name, _, value in DEFAULT.entries()}

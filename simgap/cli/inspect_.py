@@ -10,21 +10,23 @@ sign bit or a wrap-around makes, with the entry that mends them. Delete what you
 
   simgap inspect field_bag > field_map.yaml
   simgap inspect logs/one.csv
+  simgap inspect field_bag --json found.json
 """
 
 import argparse
 from pathlib import Path
 
-from simgap.command.output import reading
+from simgap.command.output import add_json_option, give, reading
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('recording', type=Path, metavar='RECORDING', help='a bag or a table')
+    add_json_option(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    from simgap.logs.inspection import first_map
+    from simgap.logs.inspection import first_map, inspected
     with reading():
-        text = first_map(arguments.recording)
-    print(text)
+        found = inspected(arguments.recording)
+    give(found, arguments.json, '\n'.join(first_map(found)))
     return 0

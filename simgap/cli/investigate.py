@@ -32,10 +32,8 @@ from simgap.errors import UserError
 from simgap.inputs.schema import Entry
 
 if TYPE_CHECKING:
+    from simgap.model.bench import Play
     from simgap.next_test.investigation import Bench, InvestigationPlan
-
-PAGE = 'story.html'
-_UNTIL = 0.9
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -46,13 +44,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def add_investigation_options(parser: argparse.ArgumentParser) -> None:
-    """Add what every investigation understands."""
     parser.add_argument('--out', type=Path, required=True, metavar='DIR',
                         help='folder of the investigation')
     parser.add_argument('--max-tests', type=int, default=4, metavar='N',
                         help='greatest number of tests (default: 4)')
-    parser.add_argument('--until', type=float, default=_UNTIL, metavar='P',
-                        help=f'probability from which an answer is sure (default: {_UNTIL:g})')
+    parser.add_argument('--until', type=float, default=0.9, metavar='P',
+                        help='probability from which an answer is sure (default: 0.9)')
     parser.add_argument('--duration', type=float, default=30.0, metavar='S',
                         help='length of each test (default: 30)')
     parser.add_argument('--jobs', type=int, default=2, metavar='N',
@@ -75,7 +72,7 @@ def plan_of(arguments: argparse.Namespace) -> InvestigationPlan:
 
 def run(arguments: argparse.Namespace) -> int:
     """Investigate, and tell the story; 1 if nothing was decided."""
-    plan, play = plan_of(arguments), PlayedBy(shlex.split(arguments.by), '{test}')
+    plan, play = plan_of(arguments), played_by(shlex.split(arguments.by), '{test}')
     from simgap.model import load_model, ModelBench
     bench = ModelBench(load_model(arguments.model), plan.duration, play, arguments.jobs)
     return investigated(arguments, bench, plan)
@@ -95,35 +92,32 @@ def investigated(arguments: argparse.Namespace, bench: Bench, plan: Investigatio
 
         story = Investigation(arguments.out, bench, plan, first, arguments.jobs).run(show)
     title, lead = headline(story)
-    with replaced(arguments.out / PAGE) as stream:
+    page = arguments.out / 'story.html'
+    with replaced(page) as stream:
         stream.write(render('story.html', title=title, lead=lead, story=story,
                             until=plan.until).encode())
-    give(story, arguments.json, '\n'.join([*lines(story), str(arguments.out / PAGE)]))
+    give(story, arguments.json, '\n'.join([*lines(story), str(page)]))
     return 0 if story['ended'] == DECIDED else 1
 
 
-class PlayedBy:
-    """Plays tests by a command of the user."""
+def played_by(words: Sequence[str], test: str) -> Play:
+    """Return what plays a test by a command in which `test` stands for it; or UserError."""
+    for place in (test, '{out}'):
+        if not any(place in word for word in words):
+            raise UserError(f'--by: {place} is missing in {" ".join(words)}')
 
-    def __init__(self, words: Sequence[str], test: str) -> None:
-        """Take the command and what stands in it for a test; UserError if a place is missing."""
-        for place in (test, '{out}'):
-            if not any(place in word for word in words):
-                raise UserError(f'--by: {place} is missing in {" ".join(words)}')
-        self._words, self._test = words, test
-
-    def __call__(self, number: int, test: Path, duration: float, out: Path) -> None:
-        """Play a test, see `Bench.run`; UserError if the command failed or wrote no recording."""
-        words = [word.replace(self._test, str(test)).replace('{out}', str(out)).replace(
-            '{duration}', f'{duration:g}').replace('{number}', str(number))
-            for word in self._words]
+    def play(number: int, sheet: Path, duration: float, out: Path) -> None:
+        filled = [word.replace(test, str(sheet)).replace('{out}', str(out)).replace(
+            '{duration}', f'{duration:g}').replace('{number}', str(number)) for word in words]
         try:
-            found = subprocess.run(words, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
+            found = subprocess.run(filled, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
                                    stderr=subprocess.PIPE, text=True, check=False,
                                    env={**os.environ, PARENT: str(os.getpid())})
         except OSError as error:
-            raise UserError(f'{words[0]}: {error.strerror}') from error
+            raise UserError(f'{filled[0]}: {error.strerror}') from error
         if found.returncode or not out.exists():
             last = (found.stderr.strip().splitlines() or ['nothing said'])[-1]
-            raise UserError(f'{words[0]}: exit code {found.returncode}, '
+            raise UserError(f'{filled[0]}: exit code {found.returncode}, '
                             + ('' if out.exists() else 'no recording; ') + last)
+
+    return play

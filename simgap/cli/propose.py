@@ -33,9 +33,6 @@ if TYPE_CHECKING:
     from simgap.next_test.candidate import Proposal
     from simgap.next_test.space import TestSpace
 
-_OBJECTIVES = ('separate', 'sharpen', 'detect')
-_RULES = ('d-optimal', 'random')
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_proposal_options(parser)
@@ -43,10 +40,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def add_proposal_options(parser: argparse.ArgumentParser) -> None:
-    """Add what every design of a test understands."""
     parser.add_argument('verdict', nargs='?', type=Path, metavar='VERDICT',
                         help='JSON of a diagnosis; not needed with --objective detect')
-    parser.add_argument('--objective', choices=_OBJECTIVES,
+    parser.add_argument('--objective', choices=('separate', 'sharpen', 'detect'),
                         help='tell the answers apart, make numbers more certain, or find effects '
                              'at all (default: separate, or detect if no answers are open)')
     parser.add_argument('--suspect', nargs='+', default=[], metavar='EFFECT',
@@ -62,7 +58,7 @@ def add_proposal_options(parser: argparse.ArgumentParser) -> None:
                         help='tests that are simulated at once (default: 2)')
     parser.add_argument('--seed', type=int, default=0, metavar='N',
                         help='of the tests that are drawn (default: 0)')
-    parser.add_argument('--rule', choices=_RULES,
+    parser.add_argument('--rule', choices=('d-optimal', 'random'),
                         help='choose by another rule, to compare with it')
 
 
@@ -72,9 +68,8 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def tests_of(model: str, duration: float) -> TestSpace:
-    """Return the tests that a model declares."""
-    from simgap.model import load_model, own_tests
-    return own_tests(load_model(model), duration)
+    from simgap.model import load_model, OwnTests
+    return OwnTests(load_model(model), duration)
 
 
 def proposed(arguments: argparse.Namespace, tests: Callable[[dict[str, Any]], TestSpace]) -> int:
@@ -130,16 +125,14 @@ def in_percent(data: dict[str, Any]) -> dict[str, Any]:
 
 
 def _write(path: Path, found: Proposal, space: TestSpace, data: dict[str, Any]) -> None:
-    """Write the test that was found: a test sheet, or a table of commands."""
     from simgap.next_test.proposal import lines
-    best = found.tests[0]
     heading = [f'{data["duration_s"]:g} s, at least {data["sample_rate_hz"]:g} samples per second',
                *(line.strip() for line in lines(in_percent(data)))]
     if data.get('channels'):
         shares = sorted(data['channels'].items(), key=lambda item: -item[1])
         heading.append('what tells: ' + ', '.join(
             f'{name} {100.0 * share:.0f} %' for name, share in shares if share > 0.005))
-    for place, text in space.files(best.test, path).items():
+    for place, text in space.files(found.tests[0].test, path).items():
         with replaced(place) as stream:
             if place.suffix == '.yaml':
                 stream.write(''.join(f'# {line}\n' for line in heading).encode())

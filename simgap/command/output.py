@@ -12,8 +12,7 @@ import os
 from pathlib import Path
 import sys
 import time
-from types import TracebackType
-from typing import IO, TextIO
+from typing import IO
 import warnings
 
 from simgap.drafts import drafted
@@ -92,32 +91,25 @@ class Progress:
     REFRESH_S = 0.1
     LINE_S = 30.0
 
-    def __init__(self, label: str, total: float, *, quiet: bool = False,
-                 stream: TextIO | None = None) -> None:
+    def __init__(self, label: str, total: float, *, quiet: bool = False) -> None:
         """Prepare to show how much of `total` is done; ValueError if that is not above zero."""
         if not total > 0:
             raise ValueError(f'total is {total}, must be more than zero')
-        self._label = label
-        self._total = total
-        self._stream = sys.stderr if stream is None else stream
-        self._shown = not quiet
-        self._on_terminal = self._stream.isatty()
+        self._label, self._total, self._shown = label, total, not quiet
+        self._on_terminal = sys.stderr.isatty()
         self._started = time.monotonic()
         self._refreshed = -math.inf if self._on_terminal else self._started
 
     def __enter__(self) -> Progress:
-        """Show the line at zero."""
         self.update(0)
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
-                 trace: TracebackType | None) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         """Leave the line complete, or as far as the work got."""
         if self._shown and self._on_terminal:
             if kind is None:
                 self._draw(self._total)
-            self._stream.write('\n')
-            self._stream.flush()
+            print(file=sys.stderr, flush=True)
 
     def update(self, done: float) -> None:
         """Show that `done` of the total is done; cheap enough to call at every turn."""
@@ -132,8 +124,8 @@ class Progress:
         bar = '#' * round(30 * part)
         spent = time.monotonic() - self._started
         line = f'{self._label}  [{bar:<30}] {100 * part:3.0f} %  {spent:.0f} s'
-        self._stream.write(f'\r{line}' if self._on_terminal else f'{line}\n')
-        self._stream.flush()
+        print(f'\r{line}' if self._on_terminal else line, file=sys.stderr, flush=True,
+              end='' if self._on_terminal else '\n')
 
 
 @contextmanager

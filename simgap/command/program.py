@@ -26,16 +26,12 @@ exit codes:
 
 
 class Command(NamedTuple):
-    """One subcommand."""
-
     module: str  # that does it, of the program's package if it has no dot
     summary: str
 
 
 @dataclass(frozen=True)
 class Program:
-    """A program with subcommands."""
-
     name: str  # as it is typed
     package: str  # whose modules are the subcommands; its docstring is the description
     version: str  # printed by --version

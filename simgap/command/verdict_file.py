@@ -17,8 +17,7 @@ if TYPE_CHECKING:
 def planning_of(path: Path) -> dict[str, Any]:
     """Return a verdict's entry `planning`; UserError if it has none, OSError if unreadable."""
     try:
-        data = json.loads(path.read_text(encoding='utf-8'))
-        return dict(data['planning'])
+        return dict(json.loads(path.read_text(encoding='utf-8'))['planning'])
     except (ValueError, TypeError) as error:
         raise UserError(f'{path}: no JSON of a diagnosis: {error}') from error
     except KeyError as error:

@@ -14,8 +14,6 @@ from simgap.errors import one_line, UserError
 
 
 class Limit(NamedTuple):
-    """One limit on what is counted."""
-
     variable: str  # of the environment, sets another limit
     default: int  # if it is not set
     what: str  # the things that are counted, for the error message
@@ -31,7 +29,6 @@ class Limit(NamedTuple):
         return int(text)
 
     def exceeded(self) -> str:
-        """Return the message for input that exceeds the limit."""
         return (f'more than {self.value()} {self.what}; if that is meant, set '
                 f'{self.variable} to a greater number')
 

@@ -48,12 +48,7 @@ def _refuse_constant(text: str) -> None:
 
 
 def from_json(text: str | bytes) -> Any:
-    """
-    Read strict JSON.
-
-    Raises PlainDataError if it is no JSON, not UTF-8, nested too deeply, or holds NaN or an
-    infinity.
-    """
+    """Read strict JSON; PlainDataError if it is none, too deep, or holds NaN or an infinity."""
     try:
         return json.loads(text, parse_constant=_refuse_constant)
     except PlainDataError:

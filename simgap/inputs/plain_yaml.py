@@ -52,11 +52,7 @@ def _loader() -> Any:
 
 
 def parse_yaml(text: str | bytes) -> Any:
-    """
-    Read YAML as plain data.
-
-    ParameterError names the place; ModuleNotFoundError: PyYAML is not installed.
-    """
+    """Read YAML as plain data; ParameterError names the place, ModuleNotFoundError PyYAML."""
     import yaml
     try:
         if isinstance(text, bytes):

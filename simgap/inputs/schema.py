@@ -33,7 +33,6 @@ class Entry:
     whole: bool = False  # whether only whole numbers are allowed
 
     def allowed(self) -> str:
-        """Say in words what is allowed."""
         if self.choices is not None:
             return 'one of ' + ', '.join(self.choices)
         kind = 'a whole number' if self.whole else 'a number'
@@ -47,12 +46,7 @@ class Entry:
         return f'{kind} from {self.low:g} to {self.high:g}{unit}'
 
     def check(self, key: str, value: object) -> Value:
-        """
-        Return `value` as this parameter's own type.
-
-        Raises ParameterError, with `key` and what is allowed, if the value is of another kind, not
-        finite or out of range.
-        """
+        """Return `value` as this parameter's own type; ParameterError says what is allowed."""
         if self.choices is not None:
             if value not in self.choices:
                 raise ParameterError(f'{key}: {quoted(value)} given, allowed is {self.allowed()}')

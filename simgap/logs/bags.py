@@ -10,6 +10,7 @@ Libraries do the reading; types are those that the bag defines, else the standar
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -83,24 +84,22 @@ def _rosbag2(path: Path, wanted: Callable[[str], bool]) -> Iterator[_Message]:
     with AnyReader([path], default_typestore=get_typestore(Stores.LATEST)) as bag:
         chosen = [connection for connection in bag.connections if wanted(connection.topic)]
         for one, logged, data in bag.messages(chosen) if chosen else ():
-            yield _Message(one.topic, one.msgtype, logged, data, _cdr(bag.typestore, one.msgtype))
+            yield _Message(one.topic, one.msgtype, logged, data,
+                           partial(_cdr, bag.typestore, one.msgtype))
 
 
-def _cdr(types: Any, kind: str) -> Callable[[bytes], Any]:
-    def decode(data: bytes) -> Any:
-        if kind not in types.fielddefs:
-            raise RecordingError(
-                f'the bag has no definition of {one_line(kind)}; `ros2 bag convert` to mcap, '
-                'where that type is installed, writes it into the bag')
-        if bytes(data[:4]) == _PACKED:
-            import zstandard
-            data = zstandard.ZstdDecompressor().decompress(data)
-        known = types.get_msgdef(kind)
-        read = {b'\0\1': known.deserialize_cdr_le, b'\0\0': known.deserialize_cdr_be}
-        # what follows a message is left: rclpy's serialize_message adds some bytes
-        return read[bytes(data[:2])](memoryview(data)[4:], 0, known.cls, types)[0]
-
-    return decode
+def _cdr(types: Any, kind: str, data: bytes) -> Any:
+    if kind not in types.fielddefs:
+        raise RecordingError(
+            f'the bag has no definition of {one_line(kind)}; `ros2 bag convert` to mcap, where '
+            'that type is installed, writes it into the bag')
+    if bytes(data[:4]) == _PACKED:
+        import zstandard
+        data = zstandard.ZstdDecompressor().decompress(data)
+    known = types.get_msgdef(kind)
+    read = {b'\0\1': known.deserialize_cdr_le, b'\0\0': known.deserialize_cdr_be}
+    # what follows a message is left: rclpy's serialize_message adds some bytes
+    return read[bytes(data[:2])](memoryview(data)[4:], 0, known.cls, types)[0]
 
 
 def _mcap(path: Path, wanted: Callable[[str], bool]) -> Iterator[_Message]:

@@ -52,7 +52,6 @@ class Channel:
     values: FloatArray  # shape (n,), float64 [unit]
 
     def __post_init__(self) -> None:
-        """Check the samples, and keep read-only copies of them."""
         if np.asarray(self.time_ns).dtype.kind not in 'iu' and len(self.time_ns):
             raise RecordingError('time stamps must be whole nanoseconds')
         object.__setattr__(self, 'time_ns', _frozen(self.time_ns, np.int64))
@@ -96,15 +95,10 @@ class Channel:
     @property
     def time_s(self) -> FloatArray:
         """Return the time stamps in seconds, each the nearest double; shape (n,)."""
-        result: FloatArray = self.time_ns / NANOSECONDS
-        return result
+        return self.time_ns / NANOSECONDS
 
     def at(self, time_ns: IntArray) -> FloatArray:
-        """
-        Return values [unit] at times [ns] on straight lines between the samples, shape (m,).
-
-        RecordingError outside the samples.
-        """
+        """Return values [unit] on straight lines at times [ns], (m,); RecordingError outside."""
         if len(time_ns) == 0:
             return np.empty(0)
         if not len(self) or time_ns.min() < self.time_ns[0] or time_ns.max() > self.time_ns[-1]:
@@ -115,8 +109,7 @@ class Channel:
         past = (time_ns - self.time_ns[before]).astype(np.float64)
         width = (self.time_ns[after] - self.time_ns[before]).astype(np.float64)
         share = np.divide(past, width, out=np.zeros_like(past), where=width > 0)
-        result: FloatArray = (1.0 - share) * self.values[before] + share * self.values[after]
-        return result
+        return (1.0 - share) * self.values[before] + share * self.values[after]
 
 
 def check_name(name: str) -> None:

@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 import math
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -38,19 +39,15 @@ _FLAGS = {'header': True, 'units_row': False, 'transposed': False}
 _TOP = (*_TEXT_ENTRIES, *_FLAGS, 'skip_lines', 'missing', 'where', 'time', 'signals', 'also')
 _TIME = ('column', 'index', 'unit', 'offset_s', 'origin', 'duplicates', 'onto')
 _PLACE = Entry('1', 0, MOST_COLUMNS, whole=True)
-_NUMBERS = {'scale': Entry('1', -1e12, 1e12), 'offset': Entry(''),
-            'clock_offset_s': Entry('s', -9e9, 9e9),
-            'counts_per_revolution': Entry('1', 1.0, 2.0**64), 'unwrap': Entry('', 0.0)}
-_WHOLE_NUMBERS = {'index': _PLACE, 'sign_magnitude_bits': Entry('1', 2, 53, whole=True)}
-_SIGNAL = ('column', 'expression', 'unit', 'sign', 'time_column', 'join', *_NUMBERS,
-           *_WHOLE_NUMBERS)
-_SKIP_LINES = Entry('1', 0, 10000, whole=True)
+_OFFSET_S = Entry('s', -9e9, 9e9)
+_NUMBERS = {'scale': Entry('1', -1e12, 1e12), 'offset': Entry(''), 'clock_offset_s': _OFFSET_S,
+            'counts_per_revolution': Entry('1', 1.0, 2.0**64), 'unwrap': Entry('', 0.0),
+            'index': _PLACE, 'sign_magnitude_bits': Entry('1', 2, 53, whole=True)}
+_SIGNAL = ('column', 'expression', 'unit', 'sign', 'time_column', 'join', *_NUMBERS)
 
 
 @dataclass(frozen=True)
 class TimeMap:
-    """How the time is written."""
-
     column: str | int = AUTO  # its name, or its place, counted from 0
     index: int | None = None  # of the time in a column of vectors
     unit: str = 's'  # one of TIME_UNITS, or iso8601 (without a zone it is taken for UTC)
@@ -80,8 +77,6 @@ class SignalMap:
 
 @dataclass(frozen=True)
 class ImportMap:
-    """What a file holds and how it is written."""
-
     time: TimeMap
     signals: Mapping[str, SignalMap]
     layout: Layout = Layout()
@@ -101,10 +96,7 @@ class KnownSignals:
     aliases: Mapping[str, str] = field(default_factory=dict)
 
 
-NO_SIGNALS = KnownSignals()
-
-
-def load_map(path: str | Path, known: KnownSignals = NO_SIGNALS) -> ImportMap:
+def load_map(path: str | Path, known: KnownSignals = KnownSignals()) -> ImportMap:
     """Read a map; ParameterError names file, key and what is allowed; known units may lack."""
     path = Path(path)
     tree = read_yaml(path)
@@ -114,7 +106,7 @@ def load_map(path: str | Path, known: KnownSignals = NO_SIGNALS) -> ImportMap:
         raise ParameterError(f'{path}: {error}') from None
 
 
-def parse_map(tree: object, known: KnownSignals = NO_SIGNALS) -> ImportMap:
+def parse_map(tree: object, known: KnownSignals = KnownSignals()) -> ImportMap:
     """Check the plain data of a map, as `load_map`; ParameterError names a wrong key."""
     top = mapping_of('the map', tree, _TOP)
     texts = {key: _text(key, top[key]) for key in _TEXT_ENTRIES if key in top}
@@ -129,8 +121,7 @@ def parse_map(tree: object, known: KnownSignals = NO_SIGNALS) -> ImportMap:
     except (LookupError, ValueError, UnicodeError):
         raise ParameterError(f'encoding: {quoted(texts["encoding"])} given, allowed is one that '
                              'Python knows, such as utf-8 or latin-1') from None
-    skip = int(_SKIP_LINES.check('skip_lines', plain_value(  # type: ignore[arg-type]
-        top.get('skip_lines', 0))))
+    skip = _checked(Entry('1', 0, 10000, whole=True), 'skip_lines', top.get('skip_lines', 0))
     rows = {key: top.get(key, usual) for key, usual in _FLAGS.items()}
     for key, value in rows.items():
         if not isinstance(value, bool):
@@ -141,8 +132,7 @@ def parse_map(tree: object, known: KnownSignals = NO_SIGNALS) -> ImportMap:
         raise ParameterError(f'missing: {quoted(plain_value(missing))} given, allowed is a list '
                              'of texts in quotes')
     signals = {}
-    own = mapping_of('signals', top.get('signals'))
-    for name, body in own.items():
+    for name, body in mapping_of('signals', top.get('signals')).items():
         signal = known.aliases.get(str(name), str(name))
         if signal in signals:
             raise ParameterError(f'signals.{one_line(name)}: {signal} is given twice')
@@ -168,9 +158,13 @@ def _also(body: object, known: KnownSignals, taken: Collection[str]) -> dict[str
     return found
 
 
+def _checked(entry: Entry, key: str, value: object) -> Any:
+    return entry.check(key, plain_value(value))
+
+
 def _text(key: str, value: object, choices: tuple[str, ...] | None = None) -> str:
     if choices is not None:
-        return str(Entry('', choices=choices).check(key, plain_value(value)))
+        return str(_checked(Entry('', choices=choices), key, value))
     if not isinstance(value, str) or not value:
         raise ParameterError(f'{key}: {quoted(plain_value(value))} given, allowed is a text')
     return value
@@ -178,7 +172,7 @@ def _text(key: str, value: object, choices: tuple[str, ...] | None = None) -> st
 
 def _column(key: str, value: object) -> str | int:
     if isinstance(value, int) and not isinstance(value, bool):
-        return int(_PLACE.check(key, plain_value(value)))  # type: ignore[arg-type]
+        return int(_checked(_PLACE, key, value))
     if not isinstance(value, str) or not value:
         raise ParameterError(f'{key}: {quoted(plain_value(value))} given, allowed is a text, or '
                              'the number of a column, counted from 0')
@@ -189,16 +183,12 @@ def _time(body: object) -> TimeMap:
     entries = mapping_of('time', body, _TIME)
     return TimeMap(
         _column('time.column', entries.get('column')),
-        _whole('time', 'index', entries),
+        _checked(_PLACE, 'time.index', entries['index']) if 'index' in entries else None,
         _text('time.unit', entries.get('unit', 's'), (*TIME_UNITS, ISO_8601)),
-        nanoseconds(_number('time.offset_s', entries.get('offset_s', 0), 'clock_offset_s')),
+        nanoseconds(_checked(_OFFSET_S, 'time.offset_s', entries.get('offset_s', 0))),
         _text('time.origin', entries.get('origin', 'keep'), ('keep', 'first')) == 'first',
         _text('time.duplicates', entries.get('duplicates', 'refuse'), ('refuse', 'first', 'last')),
         _text('time.onto', entries['onto']) if 'onto' in entries else '')
-
-
-def _number(key: str, value: object, entry: str) -> float:
-    return float(_NUMBERS[entry].check(key, plain_value(value)))  # type: ignore[arg-type]
 
 
 def _signal(key: str, name: str, body: object, known: KnownSignals) -> SignalMap:
@@ -212,45 +202,43 @@ def _signal(key: str, name: str, body: object, known: KnownSignals) -> SignalMap
         except RecordingError as error:
             raise ParameterError(f'signals: {error}') from None
     entries = mapping_of(key, body, _SIGNAL)
-    numbers = {entry: _number(f'{key}.{entry}', entries[entry], entry)
-               for entry in _NUMBERS if entry in entries}
+    numbers = {name: _checked(entry, f'{key}.{name}', entries[name])
+               for name, entry in _NUMBERS.items() if name in entries}
     sign = entries.get('sign', 1)
     if isinstance(sign, bool) or sign not in (1, -1):
         raise ParameterError(f'{key}.sign: {quoted(plain_value(sign))} given, allowed is 1 or -1')
     written = _text(f'{key}.unit', entries.get('unit', unit or None), (*UNITS, COUNTS))
-    if written == COUNTS:
-        if 'counts_per_revolution' in numbers:
-            si, factor = 'rad', 2 * math.pi / numbers['counts_per_revolution']
-        else:  # counts of a converter: the scale says what one is
-            if 'scale' not in numbers:
-                raise ParameterError(f'{key}: counts need counts_per_revolution (an angle) or '
-                                     'scale (anything else, in SI units for each count)')
-            si, factor = unit or '1', 1.0
-    else:
+    if written != COUNTS:
         if 'counts_per_revolution' in numbers:
             raise ParameterError(f'{key}.counts_per_revolution: goes with the unit counts only')
         si, factor = UNITS[written]
+    elif 'counts_per_revolution' in numbers:
+        si, factor = 'rad', 2 * math.pi / numbers['counts_per_revolution']
+    elif 'scale' in numbers:  # counts of a converter: the scale says what one is
+        si, factor = unit or '1', 1.0
+    else:
+        raise ParameterError(f'{key}: counts need counts_per_revolution (an angle) or scale '
+                             '(anything else, in SI units for each count)')
     if unit and si != unit:
         same = [text for text, (target, _) in UNITS.items() if target == unit]
         raise ParameterError(f'{key}.unit: {quoted(written)} given, but {name} is in {unit}; '
                              f'allowed is one of {", ".join((*same, COUNTS))}')
     own_time = entries.get('time_column')
     return SignalMap(
-        _expression(key, entries), si, factor,
+        _expression(key, entries, numbers.get('index')), si, factor,
         float(sign) * numbers.get('scale', 1.0), numbers.get('offset', 0.0),
         None if own_time is None else _column(f'{key}.time_column', own_time),
         nanoseconds(numbers.get('clock_offset_s', 0.0)),
-        (1 << (_whole(key, 'sign_magnitude_bits', entries) or 0)) >> 1,
+        (1 << numbers.get('sign_magnitude_bits', 0)) >> 1,
         numbers.get('unwrap', 0.0),
         _text(f'{key}.join', entries.get('join', 'next'), ('next', 'linear')))
 
 
-def _expression(key: str, entries: Mapping[str, Any]) -> Expression:
-    index = _whole(key, 'index', entries)
+def _expression(key: str, entries: Mapping[str, Any], index: int | None) -> Expression:
     if 'expression' not in entries:
-        return Expression.of_column(Reference(_column(f'{key}.column', entries.get('column')),
-                                              index))
-    for entry in ('column', *_WHOLE_NUMBERS):
+        column = Reference(_column(f'{key}.column', entries.get('column')), index)
+        return Expression((column,), itemgetter(0))
+    for entry in ('column', 'index', 'sign_magnitude_bits'):
         if entry in entries:
             raise ParameterError(f'{key}.{entry}: does not go with expression')
     if 'unit' not in entries:
@@ -260,10 +248,3 @@ def _expression(key: str, entries: Mapping[str, Any]) -> Expression:
     if not found.references:
         raise ParameterError(f'{key}.expression: names no column')
     return found
-
-
-def _whole(key: str, entry: str, entries: Mapping[str, Any]) -> int | None:
-    if entry not in entries:
-        return None
-    return int(_WHOLE_NUMBERS[entry].check(  # type: ignore[arg-type]
-        f'{key}.{entry}', plain_value(entries[entry])))

@@ -5,7 +5,8 @@ A number that a row of a file gives: a column, or a small expression over column
 
 An expression is parsed with Python's own grammar, of which the parts listed here are allowed, and
 is never evaluated as a program. Names are columns. `v[2]` is the third number of a column of
-vectors, `column('T (ms)')` a column of that name, and `column(0)` the first column.
+vectors, `column('T (ms)')` a column of that name, and `column(0)` the first column. Functions of
+`whole_columns` need every row of the file before any row has a value.
 """
 
 from __future__ import annotations
@@ -16,9 +17,12 @@ from contextlib import suppress
 from dataclasses import dataclass
 import math
 import operator
+from typing import Any
 
 from simgap.errors import one_line
 from simgap.inputs.schema import nearest, ParameterError
+from simgap.logs.channel import FloatArray
+from simgap.logs.whole_columns import WHOLE
 
 LONGEST = 1000       # characters
 MOST_COLUMNS = 10_000
@@ -38,9 +42,12 @@ FUNCTIONS: dict[str, tuple[Callable[..., float], int]] = {
     'tanh': (math.tanh, 1), 'hypot': (math.hypot, 2), 'floor': (lambda x: float(math.floor(x)), 1),
     'min': (min, 2), 'max': (max, 2),
     'sign': (lambda x: float((x > 0.0) - (x < 0.0)), 1)}
+_CALLED: dict[str, tuple[Callable[..., Any], int]] = {**FUNCTIONS, **WHOLE}
 CONSTANTS = {'pi': math.pi}
 
 _Term = Callable[[Sequence[float]], float]
+# What a function of a whole column takes, and the function, of times [s] and what it takes.
+_Whole = tuple[_Term, Callable[[FloatArray, FloatArray], FloatArray]]
 
 
 @dataclass(frozen=True)
@@ -60,12 +67,10 @@ class Expression:
     """A number as a function of columns."""
 
     references: tuple[Reference, ...]  # the columns, each of them once
-    value: _Term  # of those, in this order; ArithmeticError or ValueError if none, as 1 / 0
-
-    @classmethod
-    def of_column(cls, reference: Reference) -> Expression:
-        """Return a column as it is."""
-        return cls((reference,), operator.itemgetter(0))
+    # of those, in this order, then of the results of `whole`, the last of these first;
+    # ArithmeticError or ValueError if none, as 1 / 0
+    value: _Term
+    whole: tuple[_Whole, ...] = ()  # each may take the results of those before it
 
     def bound(self, constants: Mapping[str, float]) -> Expression:
         """Return the expression with constants in the place of columns of their names."""
@@ -73,9 +78,14 @@ class Expression:
         if not left or left == self.references:
             return self
         places = {column: k for k, column in enumerate(left)}
-        return Expression(left, lambda numbers: self.value([
-            numbers[places[column]] if column in places else constants[str(column)]
-            for column in self.references]))
+
+        def of_left(term: _Term) -> _Term:
+            return lambda numbers: term([*(
+                numbers[places[column]] if column in places else constants[str(column)]
+                for column in self.references), *numbers[len(left):]])
+
+        return Expression(left, of_left(self.value), tuple(
+            (of_left(term), function) for term, function in self.whole))
 
 
 def parse_expression(key: str, text: str) -> Expression:
@@ -90,7 +100,7 @@ def parse_expression(key: str, text: str) -> Expression:
                              f'{one_line(str(said) or "nested too deeply")}') from None
     parser = _Parser(key, text.strip())
     value = parser.term(tree, 0)
-    return Expression(tuple(parser.places), value)
+    return Expression(tuple(parser.places), value, tuple(parser.whole))
 
 
 class _Parser:
@@ -98,6 +108,7 @@ class _Parser:
 
     def __init__(self, key: str, text: str) -> None:
         self.places: dict[Reference, int] = {}
+        self.whole: list[_Whole] = []
         self._key, self._text = key, text
 
     def term(self, node: ast.expr, depth: int) -> _Term:
@@ -116,7 +127,7 @@ class _Parser:
             combined = OPERATORS[type(node.op)]
             left, right = self.term(node.left, depth + 1), self.term(node.right, depth + 1)
             return lambda numbers: combined(left(numbers), right(numbers))
-        if isinstance(node, ast.Call) and self._name(node.func) in FUNCTIONS:
+        if isinstance(node, ast.Call) and self._name(node.func) in _CALLED:
             return self._call(node, depth)
         place = self.places.setdefault(self._reference(node), len(self.places))
         return lambda numbers: numbers[place]
@@ -132,15 +143,28 @@ class _Parser:
 
     def _call(self, node: ast.Call, depth: int) -> _Term:
         name = self._name(node.func)
-        function, count = FUNCTIONS[name]
+        function, count = _CALLED[name]
         if len(node.args) != count or node.keywords:
             raise ParameterError(f'{self._key}: {name} takes {count} '
                                  f'{"number" if count == 1 else "numbers"}')
+        if name in WHOLE:
+            return self._whole(name, node.args, depth)
         terms = [self.term(argument, depth + 1) for argument in node.args]
         if count == 1:
             [only] = terms
             return lambda numbers: function(only(numbers))
         return lambda numbers: function(*[term(numbers) for term in terms])
+
+    def _whole(self, name: str, arguments: list[ast.expr], depth: int) -> _Term:
+        term = self.term(arguments[0], depth + 1)
+        numbers = [self._constant(argument)([]) if isinstance(argument, ast.Constant) else 0.0
+                   for argument in arguments[1:]]
+        if any(number <= 0.0 for number in numbers):
+            raise ParameterError(f'{self._key}: {name} takes a column and a number above 0')
+        self.whole.append((term, lambda time, values: WHOLE[name][0](time, values, *numbers)))
+        # counted from the end, because further columns may follow
+        place = -len(self.whole)
+        return lambda numbers: numbers[place]
 
     def _reference(self, node: ast.expr) -> Reference:
         if isinstance(node, ast.Subscript):
@@ -168,5 +192,5 @@ class _Parser:
         part = ast.get_source_segment(self._text, node) or self._text
         return ParameterError(
             f'{self._key}: {one_line(repr(part), 60)} is not allowed'
-            f'{nearest(called, FUNCTIONS) if called else ""}; allowed are columns, numbers, '
-            f'+ - * / % **, {", ".join([*CONSTANTS, *FUNCTIONS])}, v[0] and {_COLUMN}("name")')
+            f'{nearest(called, _CALLED) if called else ""}; allowed are columns, numbers, '
+            f'+ - * / % **, {", ".join([*CONSTANTS, *_CALLED])}, v[0] and {_COLUMN}("name")')

@@ -25,7 +25,6 @@ class Stamp(str):
 
     @classmethod
     def of(cls, nanoseconds: int) -> 'Stamp':
-        """Make one of whole nanoseconds."""
         return cls(Decimal(nanoseconds).scaleb(-9))
 
 

@@ -23,16 +23,14 @@ _BLOCK = 4096   # rows that are turned into cells at a time
 
 def arrays(columns: Mapping[str, Any], layout: Layout, names: list[str] | None = None) -> Table:
     """Return arrays as a table: vectors are columns, shape (n, k) is a column of vectors."""
-    columns = {name: _upright(values.T if layout.transposed else values)
+    columns = {name: values.T if layout.transposed else values
                for name, values in columns.items() if values.dtype.kind in 'biuf'}
+    # MATLAB gives a second dimension to every vector
+    columns = {name: values.squeeze() if values.ndim == 2 and 1 in values.shape else values
+               for name, values in columns.items()}
     columns = {name: values for name, values in columns.items() if values.ndim in (1, 2)}
     lengths = {name: len(values) for name, values in columns.items()}
     return Table(list(columns) if names is None else names, _array_rows(columns), lengths=lengths)
-
-
-def _upright(values: Any) -> Any:
-    """Return an array without the dimension that MATLAB gives to every vector."""
-    return values.squeeze() if values.ndim == 2 and 1 in values.shape else values
 
 
 def _array_rows(columns: Mapping[str, Any]) -> Iterator[tuple[int, Sequence[Text]]]:
@@ -61,7 +59,6 @@ def read_npy(path: Path, layout: Layout) -> Table:
 
 
 def read_npz(path: Path, layout: Layout) -> Table:
-    """Read arrays by name."""
     wanted, room = [], SAMPLES.value()
     with ZipFile(path) as archive:
         for name in archive.namelist():
@@ -78,8 +75,7 @@ def read_npz(path: Path, layout: Layout) -> Table:
 
 def _npy_header(stream: Any) -> tuple[int, Any]:
     """Return how many numbers an array holds, and their type, before anything is unpacked."""
-    version = np.lib.format.read_magic(stream)
-    read = (np.lib.format.read_array_header_1_0 if version == (1, 0)
+    read = (np.lib.format.read_array_header_1_0 if np.lib.format.read_magic(stream) == (1, 0)
             else np.lib.format.read_array_header_2_0)
     shape, _, kind = read(stream)
     return int(np.prod(shape, dtype=object)) * max(1, len(kind.names or ())), kind
@@ -145,7 +141,9 @@ def read_json(path: Path, layout: Layout) -> Table:
         constants.update((name, float(part)) for name, part in tree.items()
                          if type(part) in (int, float))
         inner = [name for name, part in tree.items() if isinstance(part, (dict, list))]
-        if not keys and (_is_table(tree) or len(inner) != 1):
+        is_table = any(isinstance(part, list) and part and not isinstance(part[0], dict)
+                       for part in tree.values())
+        if not keys and (is_table or len(inner) != 1):
             break
         key = keys.pop(0) if keys else inner[0]
         if key not in inner:
@@ -157,21 +155,13 @@ def read_json(path: Path, layout: Layout) -> Table:
     if not isinstance(tree, dict):
         raise RecordingError('a single value, allowed are columns in a mapping, or records')
     columns = {name: values for name, values in tree.items() if isinstance(values, list)}
-    count = max(map(len, columns.values()), default=0)
-    cells = ([cell_of(values[k]) if k < len(values) else '' for values in columns.values()]
-             for k in range(count))
+    cells = itertools.zip_longest(*(map(cell_of, values) for values in columns.values()),
+                                  fillvalue='')
     return Table(list(columns), enumerate(cells, 1), constants=constants,
                  lengths={name: len(values) for name, values in columns.items()})
 
 
-def _is_table(tree: dict[str, Any]) -> bool:
-    """Tell whether a mapping has columns, and not only records."""
-    return any(isinstance(part, list) and part and not isinstance(part[0], dict)
-               for part in tree.values())
-
-
 def read_json_lines(path: Path, layout: Layout) -> Table:
-    """Read a record in each line."""
     return _records(_parsed_lines(path), 'line')
 
 
@@ -192,19 +182,16 @@ def _parsed_lines(path: Path) -> Iterator[tuple[int, Any]]:
 
 def _records(items: Iterator[tuple[int, Any]], counted: str) -> Table:
     """Return records as rows; the columns are those of the first, and others may lack some."""
+    def fields(place: int, record: object) -> dict[str, Any]:
+        if not isinstance(record, dict):
+            raise RecordingError(f'{counted} {place}: no mapping from columns to values')
+        return _flat(record)
+
     number, first = next(items, (1, {}))
-    if not isinstance(first, dict):
-        raise RecordingError(f'{counted} {number}: no mapping from columns to values')
-    names = list(_flat(first))
-
-    def cells() -> Iterator[tuple[int, Sequence[Text]]]:
-        for place, record in itertools.chain([(number, first)], items):
-            if not isinstance(record, dict):
-                raise RecordingError(f'{counted} {place}: no mapping from columns to values')
-            found = _flat(record)
-            yield place, [cell_of(found.get(name)) for name in names]
-
-    return Table(names, cells(), counted=counted)
+    names = list(fields(number, first))
+    rows = ((place, [cell_of(value) for value in map(fields(place, record).get, names)])
+            for place, record in itertools.chain([(number, first)], items))
+    return Table(names, rows, counted=counted)
 
 
 def _flat(record: Mapping[str, Any]) -> dict[str, Any]:

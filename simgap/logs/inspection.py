@@ -17,7 +17,7 @@ import numpy as np
 from simgap.logs.bags import BagTable, LOG_TIME
 from simgap.logs.channel import Channel, FloatArray, NANOSECONDS, RecordingError
 from simgap.logs.column_map import parse_map, UNITS
-from simgap.logs.mapped import read_mapped
+from simgap.logs.mapped import read_file
 from simgap.logs.suspicions import suspicions
 from simgap.logs.table import AUTO, Layout, Seen, Table, Text
 from simgap.logs.tables import kind_of, open_table
@@ -36,8 +36,8 @@ _WORDS = (('velocit|speed|rate', 'rad/s'), ('torque|effort', 'N m'), ('current|a
           ('volt', 'V'), ('force', 'N'), ('position|angle|goal|reference|action|state', 'rad'))
 
 
-def first_map(path: Path) -> str:
-    """Return a map of all that is in a recording; RecordingError if that is no number at all."""
+def inspected(path: Path) -> dict[str, Any]:
+    """Return what is in a recording as plain data; RecordingError if that is no number at all."""
     entries = _text_entries(path) if path.exists() and not kind_of(path) else {}
     with open_table(path, Layout(**entries)) as table:
         groups = list(table.topics()) if isinstance(table, BagTable) else []
@@ -58,11 +58,13 @@ def first_map(path: Path) -> str:
     if not names:
         raise RecordingError('; '.join([f'{path}: no column of numbers', *(
             group.remark for group in groups)]).rstrip('; '))
-    return '\n'.join(_lines(path, entries, groups, _read(path, entries, names)))
+    described = _described(entries['time'], groups, _read(path, entries, names))
+    return {'recording': str(path), 'entries': entries, 'groups': described}
 
 
-def _lines(path: Path, entries: dict[str, Any], groups: Sequence[Seen],
-           read: Mapping[str | int, tuple[str, Channel]]) -> Iterator[str]:
+def _described(time: dict[str, Any], groups: Sequence[Seen],
+               read: Mapping[str | int, tuple[str, Channel]]) -> list[dict[str, Any]]:
+    """Return each group as plain data, and complete the entries of the time."""
     times = [np.unique(np.concatenate([np.empty(0, np.int64), *(
         read[name][1].time_ns for name in group.columns)])) / NANOSECONDS for group in groups]
     moves = {name for name, (_, channel) in read.items()
@@ -71,41 +73,63 @@ def _lines(path: Path, entries: dict[str, Any], groups: Sequence[Seen],
     most = max(stamps.size for stamps in times)
     main = max(range(len(groups)), key=lambda k: (not moves.isdisjoint(
         groups[k].columns), times[k].size > 0.9 * most, groups[k].clock != LOG_TIME))
-    clock = entries['time']['column'] = groups[main].clock
+    time['column'] = groups[main].clock
     if groups[1:]:
-        entries['time']['onto'] = next(read[name][0] for name in groups[main].columns
-                                       if name in moves)
-    yield f'# {path}: delete what you do not need, name the rest as your model does, and check'
-    yield '# each unit: it is guessed from names and numbers'
-    yield from (f'{key}: {json.dumps(value)}' for key, value in entries.items())
-    yield 'signals:'
+        time['onto'] = next(read[name][0] for name in groups[main].columns if name in moves)
+    described = []
     for k, (group, stamps) in enumerate(zip(groups, times, strict=True)):
         steps = np.diff(stamps)
         step = float(np.median(steps)) if steps.size else math.nan
-        yield f'  # {group.topic or "table"}{group.kind and f" ({group.kind})"}: ' + (
-            group.remark or f'{stamps.size} samples at {1.0 / step:.4g} Hz for '
-            f'{np.ptp(stamps) if stamps.size else 0.0:.6g} s')
-        for gap in np.flatnonzero(steps > _GAP * step).tolist():
-            yield f'  # a gap from {stamps[gap]:.6g} to {stamps[gap + 1]:.6g} s'
-        own = {} if group.clock == clock else {'time_column': group.clock}
+        own = {} if group.clock == time['column'] else {'time_column': group.clock}
         if k != main:
             own['join'] = 'linear'
-        for signal, channel, name in ((*read[name], name) for name in group.columns):
-            found = list(suspicions(channel))
-            entry: dict[str, Any] = {
-                'column': name, 'unit': _unit(str(name), channel.values), **own}
-            for thing in found:
-                entry.update(thing.entries)
-            yield f'  {"" if name in moves else "# "}{signal}: {json.dumps(entry)}  # ' + (
-                f'{channel.values.min():.6g} to {channel.values.max():.6g}' if len(channel)
-                else 'no number')
-            yield from (f'    # {thing.text}' for thing in found)
-    if groups[1:]:
+        described.append({
+            'topic': group.topic, 'type': group.kind, 'remark': group.remark,
+            'samples': stamps.size, 'rate_hz': 1.0 / step,
+            'length_s': float(np.ptp(stamps)) if stamps.size else 0.0,
+            'gaps_s': [stamps[gap:gap + 2].tolist()
+                       for gap in np.flatnonzero(steps > _GAP * step)],
+            'signals': {read[name][0]: {**_signal(name, read[name][1], own),
+                                        'moves': name in moves} for name in group.columns}})
+    return described
+
+
+def _signal(name: str | int, channel: Channel, own: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the entry of a signal in a map, its range, and what looks wrong."""
+    found = list(suspicions(channel))
+    entry = {'column': name, 'unit': _unit(str(name), channel.values), **own}
+    for thing in found:
+        entry.update(thing.entries)
+    values = channel.values if len(channel) else np.array([math.nan])
+    return {'entry': entry, 'least': float(values.min()), 'greatest': float(values.max()),
+            'suspicions': [thing.text for thing in found]}
+
+
+def first_map(found: Mapping[str, Any]) -> Iterator[str]:
+    """Yield the lines of a map of all that `inspected` found."""
+    yield (f'# {found["recording"]}: delete what you do not need, name the rest as your model '
+           'does, and check')
+    yield '# each unit: it is guessed from names and numbers'
+    yield from (f'{key}: {json.dumps(value)}' for key, value in found['entries'].items())
+    yield 'signals:'
+    for group in found['groups']:
+        kind = f' ({group["type"]})' if group['type'] else ''
+        yield f'  # {group["topic"] or "table"}{kind}: ' + (
+            group['remark'] or f'{group["samples"]} samples at {group["rate_hz"]:.4g} Hz for '
+            f'{group["length_s"]:.6g} s')
+        for first, last in group['gaps_s']:
+            yield f'  # a gap from {first:.6g} to {last:.6g} s'
+        for name, signal in group['signals'].items():
+            mark = '' if signal['moves'] else '# '
+            yield f'  {mark}{name}: {json.dumps(signal["entry"])}  # ' + (
+                'no number' if math.isnan(signal['least']) else
+                f'{signal["least"]:.6g} to {signal["greatest"]:.6g}')
+            yield from (f'    # {text}' for text in signal['suspicions'])
+    if found['groups'][1:]:
         yield '# join: linear moves samples to the nearest stamps of onto; omit it for a command'
 
 
 def _head(table: Table) -> list[Sequence[Text]]:
-    """Return the first rows of a table."""
     return [row for _, (_, row) in zip(range(_HEAD), table.rows)]
 
 
@@ -154,8 +178,7 @@ def _numbers(table: Table, rows: Sequence[Sequence[Text]], entries: Mapping[str,
                      for cell in cells]
             numbers = [number for text in texts if (number := _number(text, entries)) is not None]
             if len(numbers) == len(texts) and np.isfinite(numbers).any():
-                whole = name or place
-                columns[whole if label is None else f'{name}[{label}]'] = np.array(numbers)
+                columns[f'{name}[{label}]' if width else name or place] = np.array(numbers)
     return columns
 
 
@@ -186,8 +209,8 @@ def _read(path: Path, entries: Mapping[str, Any], names: Sequence[str | int],
         while word in signals:
             word += '_'
         signals[word] = name
-    channels = read_mapped(path, parse_map({**entries, 'signals': {
-        word: {'column': name, 'unit': '1'} for word, name in signals.items()}}))
+    channels = read_file(path, parse_map({**entries, 'signals': {
+        word: {'column': name, 'unit': '1'} for word, name in signals.items()}})).channels
     return {name: (word, channels[word]) for word, name in signals.items()}
 
 

@@ -8,7 +8,7 @@ A simulation takes one step from row to row, so rows that a recorder lost are pu
 
 from array import array
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 import math
 from pathlib import Path
 
@@ -29,7 +29,6 @@ from simgap.logs.text import Cell, LATEST_S, parse_number
 from simgap.machine.contract import FloatArray
 
 _LEAST_SAMPLES = 2
-_CONSTANT = Entry('')
 # A command is known in a gap where the rates before and after it tell the way across it up to this
 # share of its range.
 _KNOWN = 0.01
@@ -102,7 +101,6 @@ class OneTest:
 
     @property
     def constants(self) -> Mapping[str, float]:
-        """Return what the tester knows of this test."""
         return self.log.constants
 
     def __getitem__(self, column: str) -> FloatArray:
@@ -114,9 +112,8 @@ def beginning(log: Log, until: float) -> Log:
     count = max(int(np.searchsorted(log.time, log.time[0] + until, side='right')), _LEAST_SAMPLES)
     if count >= log.time.size:
         return log
-    return Log(log.name, log.time[:count],
-               {name: values[:count] for name, values in log.columns.items()},
-               log.constants, log.labels)
+    return replace(log, time=log.time[:count], columns={
+        name: values[:count] for name, values in log.columns.items()})
 
 
 def read_log(path: str | Path, import_map: ImportMap | None = None) -> Log:
@@ -235,18 +232,15 @@ def _joined(channel: Channel, stamps: IntArray, join: str) -> FloatArray:
 
 
 def _sheet(path: Path) -> tuple[dict[str, float], dict[str, str]]:
-    """Return constants and labels of a test sheet, if there is one."""
     if not path.is_file():
         return {}, {}
     try:
         top = mapping_of('', read_yaml(path), ('constants', 'labels'))
-        constants = mapping_of('constants', top.get('constants', {}))
-        labels = dict(parse_labels('labels', top.get('labels', {})))
-        numbers = {name: float(_CONSTANT.check(f'constants.{name}', plain_value(  # type: ignore
-            value))) for name, value in constants.items()}
+        constants = {name: float(Entry('').check(f'constants.{name}', plain_value(  # type: ignore
+            value))) for name, value in mapping_of('constants', top.get('constants', {})).items()}
+        return constants, dict(parse_labels('labels', top.get('labels', {})))
     except ParameterError as error:
         raise LogError(f'{path}: {error}') from None
-    return numbers, labels
 
 
 def _held(values: FloatArray) -> FloatArray:
@@ -295,4 +289,4 @@ def without_gaps(log: Log, commands: Sequence[str], settles_s: float = 0.0) -> L
             columns[name][lost] = across(lost)
     for name in columns.keys() - set(commands):
         columns[name][unknown] = np.nan
-    return Log(log.name, time, columns, log.constants, log.labels)
+    return replace(log, time=time, columns=columns)

@@ -5,9 +5,10 @@
 from __future__ import annotations
 
 from array import array
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime, timedelta, timezone
+from functools import partial
 import math
 from pathlib import Path
 import re
@@ -17,7 +18,9 @@ import warnings
 import numpy as np
 from simgap.errors import one_line
 from simgap.inputs.limits import SAMPLES
-from simgap.logs.channel import Channel, make_channel, RecordingError, RecordingWarning
+from simgap.logs.channel import (
+    Channel, make_channel, NANOSECONDS, RecordingError, RecordingWarning,
+)
 from simgap.logs.column_map import ImportMap, ISO_8601, SignalMap, TIME_UNITS
 from simgap.logs.expression import Reference
 from simgap.logs.fields import Stamp
@@ -39,11 +42,6 @@ class MappedFile:
     # equal for signals whose stamps are those of one clock; and how each comes onto another
     clocks: Mapping[str, tuple[object, str]]
     constants: Mapping[str, float]  # that the file tells beside its table
-
-
-def read_mapped(path: str | Path, import_map: ImportMap) -> dict[str, Channel]:
-    """Return the signals that a map finds in a file, by name; errors as of `read_file`."""
-    return dict(read_file(path, import_map).channels)
 
 
 def read_file(path: str | Path, import_map: ImportMap,
@@ -105,6 +103,7 @@ def _channels(import_map: ImportMap, signals: list[_Samples]) -> dict[str, Chann
     channels: dict[str, Channel] = {}
     shared = np.empty(0, np.int64)
     for (name, signal), samples in zip(import_map.signals.items(), signals, strict=True):
+        samples.finish()
         times = np.array(samples.stamps, np.int64) - origin
         if not np.array_equal(times, shared):
             shared = times
@@ -139,8 +138,6 @@ def _check_lengths(table: Table, signals: Sequence[_Samples]) -> None:
 
 
 class _Samples:
-    """Collects the samples of one signal."""
-
     def __init__(self, path: Path, signal: SignalMap, table: Table, import_map: ImportMap) -> None:
         self.stamps, self.values = array('q'), array('d')
         self.name = ' and '.join(map(str, signal.number.references))
@@ -155,6 +152,8 @@ class _Samples:
             self._parts.append((reference if index is None else replace(reference, index=index),
                                 place))
         self._decimal, self._duplicates = import_map.layout.decimal, import_map.time.duplicates
+        # line and numbers of each sample, where all of them are needed for a value
+        self._rows: list[tuple[int, list[float]]] = []
 
     def read(self, line: int, row: Sequence[Text], stamps: Mapping[str | int, int | None]) -> None:
         """Take the sample of a row, if it has one."""
@@ -166,24 +165,53 @@ class _Samples:
             if not text:
                 return
             numbers.append(_number_of(text, cell, self._decimal, signal.sign_bit))
+        value = math.nan if signal.number.whole else self._value(line, numbers)
         cell = Cell(self._path, line, self.name, self._counted)
-        try:
-            number = signal.number.value(numbers)
-        except (ArithmeticError, ValueError) as error:
-            raise cell.refuse(f'the expression has no value, {one_line(error)}') from None
         stamp = stamps[self.clock]
         if stamp is None:
             raise cell.refuse('there is a value, but no time stamp')
-        value = signal.factor * (signal.gain * number + signal.offset)
         stamp += signal.clock_offset_ns
-        if not math.isfinite(value) or abs(stamp) >= 2**63:
+        if abs(stamp) >= 2**63:
             raise cell.refuse('too large a number')
         if self.stamps and stamp == self.stamps[-1] and self._duplicates != 'refuse':
-            if self._duplicates == 'last':
-                self.values[-1] = value
-            return
+            if self._duplicates == 'first':
+                return
+            del self.stamps[-1:], self.values[-1:], self._rows[-1:]
         self.stamps.append(stamp)
         self.values.append(value)
+        if signal.number.whole:
+            self._rows.append((line, numbers))
+
+    def finish(self) -> None:
+        """Compute what could not be computed before all rows were there."""
+        whole, rows, self._rows = self._signal.number.whole, self._rows, []
+        if not rows:
+            return
+        time = (np.array(self.stamps) - self.stamps[0]) / NANOSECONDS
+        for _, numbers in rows:
+            numbers += [math.nan] * len(whole)
+        for k, (term, function) in enumerate(whole, 1):
+            taken = np.array([self._told(line, term, numbers) for line, numbers in rows])
+            found = self._told(rows[-1][0], partial(function, time), taken)
+            for (_, numbers), value in zip(rows, found.tolist(), strict=True):
+                numbers[-k] = value
+        self.values = array('d', (self._value(line, numbers) for line, numbers in rows))
+
+    def _told(self, line: int, term: Callable[[Any], Any], given: Any) -> Any:
+        """Return what a part of the expression gives; RecordingError, with its place, if none."""
+        try:
+            return term(given)
+        except (ArithmeticError, ValueError) as error:
+            raise Cell(self._path, line, self.name, self._counted).refuse(
+                f'the expression has no value, {one_line(error)}') from None
+
+    def _value(self, line: int, numbers: Sequence[float]) -> float:
+        signal = self._signal
+        number = self._told(line, signal.number.value, numbers)
+        value = signal.factor * (signal.gain * number + signal.offset)
+        if not math.isfinite(value):
+            raise Cell(self._path, line, self.name, self._counted).refuse('too large a number')
+        return value
 
 
 def _element(given: Text, reference: Reference, cell: Cell, decimal: str) -> str:

@@ -17,8 +17,6 @@ _PERIODS = (2 * math.pi, 360.0, 1.0, *(2.0**bits for bits in range(8, 33)))
 
 
 class Suspicion(NamedTuple):
-    """One thing that looks wrong."""
-
     text: str
     entries: Mapping[str, float] = {}  # of a map, that mend it
 

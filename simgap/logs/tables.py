@@ -67,8 +67,8 @@ def _text_table(path: Path, stream: Any, layout: Layout) -> Table:
         next(table, None)
     if layout.header:
         return Table([cell.strip() for cell in first], table, start, 'line', is_text=True)
-    again = [(line, first)] if first else []
-    return Table([''] * len(first), itertools.chain(again, table), start, 'line', is_text=True)
+    table = itertools.chain([(line, first)] if first else [], table)
+    return Table([''] * len(first), table, start, 'line', is_text=True)
 
 
 def _text_rows(path: Path, stream: Any, layout: Layout) -> Iterator[tuple[int, list[str]]]:

@@ -34,9 +34,8 @@ class Cell(NamedTuple):
 
     def refuse(self, problem: str) -> RecordingError:
         """Return the error that names the place."""
-        column = one_line(self.column, 60)
-        return RecordingError(
-            f'{self.path}: {self.counted} {self.line}, column {column}: {problem}')
+        return RecordingError(f'{self.path}: {self.counted} {self.line}, column '
+                              f'{one_line(self.column, 60)}: {problem}')
 
 
 def parse_number(text: str, cell: Cell) -> float:

@@ -80,7 +80,7 @@ class Effect:
     Something that the model may lack.
 
     id, component : 'component.effect', and the part of the machine that it sits in
-    cause, look : its physical cause, and what the signals show, one sentence each
+    cause : its physical cause, one sentence
     forms : alternatives; the best one counts
     parts : ids of the effects that act together in it, each in its own place
     simpler : ids of the effects that it becomes at an end of its range
@@ -89,7 +89,6 @@ class Effect:
     id: str  # noqa: A003: the word of the verdict's format
     component: str
     cause: str
-    look: str
     forms: tuple[Form, ...]
     parts: tuple[str, ...] = ()
     simpler: tuple[str, ...] = ()

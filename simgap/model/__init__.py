@@ -3,7 +3,7 @@
 """The public face of machines of your own for the diagnosis, see docs/own-machine.md."""
 
 from simgap.logs.log import Log, LogError, OneTest, read_log, read_logs, without_gaps
-from simgap.model.allowed_tests import own_tests, OwnTests, propose
+from simgap.model.allowed_tests import OwnTests, propose
 from simgap.model.bench import investigate, ModelBench
 from simgap.model.checking import check_model, Checked
 from simgap.model.declaration import (
@@ -18,7 +18,7 @@ from simgap.model.unseen import Unseen, unseen
 __all__ = [
     'check_model', 'Checked', 'diagnose_logs', 'effect', 'Effect', 'form', 'free', 'investigate',
     'known', 'load_model', 'Log', 'LogError', 'machine', 'Model', 'ModelBench', 'ModelError',
-    'Numbers', 'OneTest', 'OwnMachine', 'own_tests', 'OwnTests', 'propose', 'push',
-    'pushes_found', 'reading', 'read_log', 'read_logs', 'ripple', 'shape', 'size', 'Unseen',
-    'unseen', 'within', 'without_gaps',
+    'Numbers', 'OneTest', 'OwnMachine', 'OwnTests', 'propose', 'push', 'pushes_found', 'reading',
+    'read_log', 'read_logs', 'ripple', 'shape', 'size', 'Unseen', 'unseen', 'within',
+    'without_gaps',
 ]

@@ -23,12 +23,15 @@ class OwnTests(TestSpace):
     """The tests of `duration_s` [s] that a model of one's own declares, within its limits."""
 
     def __init__(self, model: Model, duration_s: float) -> None:
+        """Take the tests from a model; ModelError if it declares none."""
+        if not model.tests:
+            raise ModelError('tests: the model does not say what a test may be; give machine(..., '
+                             'tests={kind: f(duration_s, random) -> Log})')
         self.families = tuple(model.tests)
         self._model, self._duration = model, duration_s
         self.limits = model.limits
 
     def draw(self, family: str, random: np.random.Generator) -> Log:
-        """Return the log of a test of a family, without readings."""
         log = self._model.tests[family](self._duration, random)
         if not isinstance(log, Log):
             raise ModelError(f'tests: {family}: {type(log).__name__} returned, allowed is a Log')
@@ -42,7 +45,6 @@ class OwnTests(TestSpace):
         return OwnMachine(self._model, [self._with_readings(test, every_sample.predict({}, 0))])
 
     def use(self, machine: Machine, points: Sequence[Point]) -> Mapping[str, float]:
-        """Return the share of each limit that a test uses, the worst of some variants."""
         readings = [np.abs(machine.predict(point, 0)).max(axis=0) for point in points]
         # a run that diverged keeps no limit
         worst = np.nan_to_num(np.max(readings, axis=0), nan=np.inf)
@@ -54,7 +56,6 @@ class OwnTests(TestSpace):
         return test.time, next(iter(test.columns.values()), np.zeros_like(test.time)), ''
 
     def as_data(self, test: Any) -> dict[str, Any]:
-        """Return what a test is: its columns, length, samples and constants."""
         return {'columns': list(test.columns), 'samples': int(test.time.size),
                 'length_s': float(test.time[-1] - test.time[0]), 'constants': dict(test.constants)}
 
@@ -76,14 +77,6 @@ class OwnTests(TestSpace):
         return replace(test, columns={**columns, **test.columns})
 
 
-def own_tests(model: Model, duration_s: float) -> OwnTests:
-    """Return the tests that a model declares. Raises ModelError if it declares none."""
-    if not model.tests:
-        raise ModelError('tests: the model does not say what a test may be; give machine(..., '
-                         'tests={kind: f(duration_s, random) -> Log})')
-    return OwnTests(model, duration_s)
-
-
 def propose(model: Model, verdict: Verdict | None = None, duration_s: float = 30.0,
             threads: int = 2, seed: int = 0) -> Proposal:
     """
@@ -93,5 +86,5 @@ def propose(model: Model, verdict: Verdict | None = None, duration_s: float = 30
     tests that are drawn. Raises ModelError if the model declares no tests.
     """
     findings = Findings.of_data(verdict.planning) if verdict else Findings()
-    return TestDesign(own_tests(model, duration_s), findings, objective_for(findings),
+    return TestDesign(OwnTests(model, duration_s), findings, objective_for(findings),
                       threads=threads, seed=seed).run()

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from simgap.logs.log import read_log
-from simgap.model.allowed_tests import own_tests
+from simgap.model.allowed_tests import OwnTests
 from simgap.model.declared import Model
 from simgap.model.diagnose import diagnose_logs
 from simgap.next_test.investigation import Bench, Investigation, InvestigationPlan
@@ -25,17 +25,15 @@ class ModelBench(Bench):
     played = 'command_{number}.csv'
 
     def __init__(self, model: Model, duration_s: float, play: Play, threads: int = 2) -> None:
-        self.space = own_tests(model, duration_s)
+        self.space = OwnTests(model, duration_s)
         self.limits = dict(model.limits)
         self._model, self._play, self._threads = model, play, threads
 
     def save(self, test: Any, path: Path) -> None:
-        """Write the commands, and constants beside them."""
         for place, text in self.space.files(test, path).items():
             place.write_text(text, encoding='utf-8')
 
     def run(self, number: int, test: Path, duration: float, out: Path) -> None:
-        """Play a test, and take its constants along, see `Bench`."""
         self._play(number, test, duration, out)
         constants = test.with_suffix('.yaml')
         if constants.exists():

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is wrong with a model of one's own, found out before any fit."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 import math
 import time
@@ -12,9 +12,9 @@ from simgap.errors import UserError
 from simgap.logs.log import Log, OneTest
 from simgap.machine.check import check_machine, check_tests, idle_effects
 from simgap.machine.contract import FloatArray, Parameter
-from simgap.model.declared import Model, Numbers
+from simgap.model.declared import Model
 from simgap.model.machine import OwnMachine
-from simgap.model.response import NO_RESPONSE, StepResponse, tests_of, where_it_acts
+from simgap.model.response import NO_RESPONSE, responses, StepResponse, where_it_acts
 from simgap.verdict.spoken import quantity
 
 # Two difference quotients with a step and twice the step differ by less than this where the
@@ -33,7 +33,6 @@ class Checked:
     remarks: Sequence[str]
 
     def summary(self) -> str:
-        """Return all that was found, and how much has to be mended."""
         return '\n'.join([
             *(f'wrong: {line}' for line in self.faults), *self.remarks,
             f'{len(self.faults)} to mend' if self.faults else 'nothing is wrong'])
@@ -60,18 +59,12 @@ def check_model(model: Model, logs: Sequence[Log]) -> Checked:
         return Checked([str(error)], [])
 
 
-def _test(machine: OwnMachine, experiment: int) -> tuple[Numbers, OneTest]:
-    log = machine.logs[experiment]
-    return machine.numbers({}, experiment), OneTest(
-        log, {name: np.zeros(log.time.size) for name in machine.model.push})
-
-
 def _unknown_numbers(machine: OwnMachine) -> Iterator[str]:
-    """Yield numbers that the simulation never asks for."""
     asked: set[str] = set()
-    for k in range(len(machine.logs)):
-        numbers, test = _test(machine, k)
-        machine.simulated(numbers, test)
+    for k, log in enumerate(machine.logs):
+        numbers = machine.numbers({}, k)
+        machine.simulated(numbers, OneTest(
+            log, {name: np.zeros(log.time.size) for name in machine.model.push}))
         asked |= numbers.asked_for
     for name in machine.numbers({}, 0):
         if name not in asked:
@@ -80,7 +73,6 @@ def _unknown_numbers(machine: OwnMachine) -> Iterator[str]:
 
 def _changed_inputs(machine: OwnMachine,
                     before: Sequence[Mapping[str, FloatArray]]) -> Iterator[str]:
-    """Yield columns that the simulation has written into."""
     for log, columns in zip(machine.logs, before, strict=True):
         for name, values in columns.items():
             if not np.array_equal(values, log[name], equal_nan=True):
@@ -89,7 +81,6 @@ def _changed_inputs(machine: OwnMachine,
 
 
 def _differs_in_itself(machine: OwnMachine) -> Iterator[str]:
-    """Yield tests whose readings differ from run to run."""
     for k, experiment in enumerate(machine.experiments):
         first, second = (machine.predict({}, k) for _ in range(2))
         change = float(np.nanmax(np.abs(first - second) / experiment.noise))
@@ -99,11 +90,10 @@ def _differs_in_itself(machine: OwnMachine) -> Iterator[str]:
 
 
 def _idle_pushes(machine: OwnMachine) -> Iterator[str]:
-    """Yield places where a push changes no reading, or far too much."""
     neutral = [machine.predict({}, k) for k in range(len(machine.logs))]
     for place in machine.disturbance_inputs:
         pushed = machine.simulate_disturbed({}, place, np.ones_like)
-        change = max(_rms(one - other, e.noise) for one, other, e in zip(
+        change = max(_rms((one - other) / experiment.noise) for one, other, experiment in zip(
             pushed, neutral, machine.experiments, strict=True))
         if change < NO_RESPONSE:
             name = machine.push_at(place.name)
@@ -113,11 +103,10 @@ def _idle_pushes(machine: OwnMachine) -> Iterator[str]:
 def _rough(machine: OwnMachine) -> Iterator[str]:
     """Yield numbers by which the readings have no derivative, or that change nothing."""
     for parameter in machine.nuisances:
-        responses = [StepResponse.at(machine, parameter, k, {})
-                     for k in tests_of(machine, parameter)]
-        if not any(item.acts for item in responses):
+        found = list(responses(machine, parameter, {}))
+        if not any(item.acts for item in found):
             yield f'{parameter.name}: changes no reading in these tests; make it known()'
-        yield from _told(parameter, responses)
+        yield from _told(parameter, found)
 
 
 def _rough_effects(machine: OwnMachine) -> Iterator[str]:
@@ -125,18 +114,16 @@ def _rough_effects(machine: OwnMachine) -> Iterator[str]:
     for effect in machine.catalogue.values():
         form = effect.forms[0]
         for parameter in form.sizes:
-            if not any(StepResponse.at(machine, parameter, k, form.start).acts
-                       for k in tests_of(machine, parameter)):
+            if not any(item.acts for item in responses(machine, parameter, form.start)):
                 yield (f'{parameter.name}: a step of {quantity(parameter.step, parameter.unit)} '
                        'from 0 changes no reading, and a search begins there; let it act from 0 '
                        'on, or give a larger step=')
-            here = where_it_acts(form, parameter)
-            yield from _told(parameter, [StepResponse.at(machine, parameter, k, here)
-                                         for k in tests_of(machine, parameter)])
+            yield from _told(parameter, responses(
+                machine, parameter, where_it_acts(form, parameter)))
 
 
-def _told(parameter: Parameter, responses: Sequence[StepResponse]) -> Iterator[str]:
-    worst = max((item.roughness for item in responses), default=0.0)
+def _told(parameter: Parameter, found: Iterable[StepResponse]) -> Iterator[str]:
+    worst = max((item.roughness for item in found), default=0.0)
     if worst > _ROUGH:
         yield (f'{parameter.name}: the derivative of the readings by it is noise: it changes by '
                f'{100.0 * min(worst, 9.99):.0f} % where the step of '
@@ -144,8 +131,8 @@ def _told(parameter: Parameter, responses: Sequence[StepResponse]) -> Iterator[s
                'simulation, let it switch between samples, or give a larger step=')
 
 
-def _rms(change: FloatArray, noise: FloatArray) -> float:
-    return math.sqrt(float(np.nanmean((change / noise) ** 2)))
+def _rms(change: FloatArray) -> float:
+    return math.sqrt(float(np.nanmean(change ** 2)))
 
 
 def _remarks(machine: OwnMachine, compiling_s: float) -> Iterator[str]:
@@ -164,10 +151,9 @@ def _remarks(machine: OwnMachine, compiling_s: float) -> Iterator[str]:
                 yield (f'{experiment.name}: {channel}: {count} samples, too few to judge; more '
                        f'than {_LEAST_SAMPLES} are needed')
                 continue
-            gap = math.sqrt(float(np.nanmean((measured - predicted[:, j]) ** 2)))
             yield (f'{experiment.name}: {channel}: measured {np.nanmin(measured):.4g} to '
                    f'{np.nanmax(measured):.4g}, simulated {np.min(predicted[:, j]):.4g} to '
                    f'{np.max(predicted[:, j]):.4g} {experiment.units[j]}; gap before any fit '
-                   f'{gap:.3g}, noise {experiment.noise[0, j]:.3g}')
+                   f'{_rms(measured - predicted[:, j]):.3g}, noise {experiment.noise[0, j]:.3g}')
     yield (f'one run of all tests takes {run_s:.2g} s (the first one {compiling_s:.2g} s); a '
            f'diagnosis takes a few thousand, about {_RUNS * run_s / 60.0:.2g} min')

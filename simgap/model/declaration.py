@@ -72,13 +72,13 @@ def form(name: str, **numbers: Number) -> OwnForm:
     return OwnForm(name, numbers)
 
 
-def effect(name: str, *forms: OwnForm, cause: str = '', look: str = '', simpler: str = '',
+def effect(name: str, *forms: OwnForm, cause: str = '', simpler: str = '',
            **numbers: Number) -> OwnEffect:
     """
     Return an effect that the model may lack.
 
     name : 'component.effect'
-    cause, look : its physical cause, and what the readings show, one sentence each
+    cause : its physical cause, one sentence
     simpler : effect that it becomes at an end of its range; the two are left out together
     forms : alternative forms, if there are several
     numbers : of its only form: `size` or `shape` by name
@@ -88,13 +88,11 @@ def effect(name: str, *forms: OwnForm, cause: str = '', look: str = '', simpler:
     if bool(forms) == bool(numbers):
         raise ModelError(f'effect {name}: give its numbers, such as half_gap=size(0, 1e-3, '
                          "'rad'), or several form()s")
-    return OwnEffect(name, cause or name.partition('.')[2].replace('_', ' '), look,
-                     forms or (OwnForm('', numbers),), simpler=simpler)
+    return OwnEffect(name, cause, forms or (OwnForm('', numbers),), simpler=simpler)
 
 
 def ripple(name: str, stem: str, amplitude: Number, angle: str | Angle,
-           orders: Sequence[float] = (), *, harmonics: int = 1, cause: str = '', look: str = '',
-           ) -> OwnEffect:
+           orders: Sequence[float] = (), *, harmonics: int = 1, cause: str = '') -> OwnEffect:
     """
     Return a wave by an angle that the model may lack.
 
@@ -106,9 +104,9 @@ def ripple(name: str, stem: str, amplitude: Number, angle: str | Angle,
     angle : column of the logs [rad], or a function of a log that returns the angle [rad]
     orders : cycles per revolution that are tried; empty to find them in the residual
     harmonics : how many the wave has, its fundamental counted; real waves are seldom pure
-    cause, look : as for `effect`
+    cause : as for `effect`
     """
     column = angle
     follow = angle if callable(angle) else (lambda log: log[column])
-    return OwnEffect(name, cause or name.partition('.')[2].replace('_', ' '), look,
-                     ripple=Ripple(stem, amplitude, follow, tuple(map(float, orders)), harmonics))
+    return OwnEffect(name, cause, ripple=Ripple(
+        stem, amplitude, follow, tuple(map(float, orders)), harmonics))

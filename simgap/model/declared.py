@@ -30,8 +30,6 @@ class ModelError(UserError):
 
 @dataclass(frozen=True)
 class Number:
-    """A number of the simulation."""
-
     value: float  # as configured
     low: float  # bound; the value for a known number
     high: float  # bound; the value for a known number
@@ -44,7 +42,6 @@ class Number:
 
     @property
     def is_known(self) -> bool:
-        """Return whether the number is never fitted."""
         return self.low == self.high
 
     @property
@@ -115,8 +112,7 @@ class OwnEffect:
     """Something that the model may lack."""
 
     name: str  # 'component.effect'
-    cause: str  # its physical cause, one sentence
-    look: str  # what it looks like in the readings, one sentence
+    cause: str  # its physical cause, one sentence; '' for what its name says
     forms: tuple[OwnForm, ...] = ()  # alternatives; the best one counts
     ripple: Ripple | None = None  # in the place of forms
     simpler: str = ''  # what it becomes at an end of its range
@@ -168,53 +164,49 @@ class Model:
     limits: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        _check(self)
-
-
-def _check(model: Model) -> None:
-    if not callable(model.simulate):
-        raise ModelError('simulate: no function given')
-    if not model.readings:
-        raise ModelError('readings: none is given')
-    for name, sensor in model.readings.items():
-        if not isinstance(sensor, Reading):
-            raise ModelError(f'readings: {name}: give reading(unit, noise)')
-        if not sensor.sigma > 0.0:
-            raise ModelError(f'readings: {name}: noise: {sensor.noise:g} given, allowed is a '
-                             'number above 0, in the unit of the reading, or a digit')
-    taken: dict[str, str] = {}
-    for where, numbers in (('base', model.base), ('per_test', model.per_test)):
-        for name, number in numbers.items():
-            _check_number(f'{where}: {name}', number)
-            if not number.low <= number.value <= number.high:
-                raise ModelError(f'{where}: {name}: {number.value:g} given, allowed is '
-                                 f'{number.low:g} to {number.high:g}')
-            _take(taken, name, where)
-    for item in model.effects:
-        if not isinstance(item, OwnEffect):
-            raise ModelError(f'effects: {item!r} given, allowed is effect() or ripple()')
-        _check_effect(item, taken)
-    names = [item.name for item in model.effects]
-    for name in names:
-        if names.count(name) > 1:
-            raise ModelError(f'effect {name}: the name is there twice')
-    for item in model.effects:
-        others = [name for name in names if name != item.name]
-        if item.simpler and item.simpler not in others:
-            raise ModelError(f'effect {item.name}: simpler: {item.simpler}: no such other effect'
-                             f'{nearest(item.simpler, others)}')
-    for name, draw in model.tests.items():
-        if not callable(draw):
-            raise ModelError(f'tests: {name}: give a function f(duration_s, random) -> Log')
-    for name, limit in model.limits.items():
-        if name not in model.readings:
-            raise ModelError(f'limits: {name}: no such reading{nearest(name, model.readings)}')
-        if not limit > 0.0:
-            raise ModelError(f'limits: {name}: {limit!r} given, allowed is a number above 0')
-    for name, place in model.push.items():
-        if not isinstance(place, Push) or not place.size > 0.0:
-            raise ModelError(f'push: {name}: give push(component, label, unit, size) with a size '
-                             'above 0')
+        if not callable(self.simulate):
+            raise ModelError('simulate: no function given')
+        if not self.readings:
+            raise ModelError('readings: none is given')
+        for name, sensor in self.readings.items():
+            if not isinstance(sensor, Reading):
+                raise ModelError(f'readings: {name}: give reading(unit, noise)')
+            if not sensor.sigma > 0.0:
+                raise ModelError(f'readings: {name}: noise: {sensor.noise:g} given, allowed is a '
+                                 'number above 0, in the unit of the reading, or a digit')
+        taken: dict[str, str] = {}
+        for where, numbers in (('base', self.base), ('per_test', self.per_test)):
+            for name, number in numbers.items():
+                _check_number(f'{where}: {name}', number)
+                if not number.low <= number.value <= number.high:
+                    raise ModelError(f'{where}: {name}: {number.value:g} given, allowed is '
+                                     f'{number.low:g} to {number.high:g}')
+                _take(taken, name, where)
+        for item in self.effects:
+            if not isinstance(item, OwnEffect):
+                raise ModelError(f'effects: {item!r} given, allowed is effect() or ripple()')
+            _check_effect(item, taken)
+        names = [item.name for item in self.effects]
+        for name in names:
+            if names.count(name) > 1:
+                raise ModelError(f'effect {name}: the name is there twice')
+        for item in self.effects:
+            others = [name for name in names if name != item.name]
+            if item.simpler and item.simpler not in others:
+                raise ModelError(f'effect {item.name}: simpler: {item.simpler}: no such other '
+                                 f'effect{nearest(item.simpler, others)}')
+        for name, draw in self.tests.items():
+            if not callable(draw):
+                raise ModelError(f'tests: {name}: give a function f(duration_s, random) -> Log')
+        for name, limit in self.limits.items():
+            if name not in self.readings:
+                raise ModelError(f'limits: {name}: no such reading{nearest(name, self.readings)}')
+            if not limit > 0.0:
+                raise ModelError(f'limits: {name}: {limit!r} given, allowed is a number above 0')
+        for name, place in self.push.items():
+            if not isinstance(place, Push) or not place.size > 0.0:
+                raise ModelError(f'push: {name}: give push(component, label, unit, size) with a '
+                                 'size above 0')
 
 
 def _check_effect(item: OwnEffect, taken: dict[str, str]) -> None:

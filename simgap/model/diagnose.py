@@ -35,16 +35,18 @@ _LEAST_ERROR = 0.01
 
 @dataclass(frozen=True, repr=False)
 class OwnVerdict(Verdict):
-    """A verdict on a declared model."""
-
     # value, configured and unit of each number of the simulation, as fitted
     numbers: Mapping[str, Any]
     # where something enters that no effect names: test, place, from_s, until_s, size and unit
     pushes: Sequence[Mapping[str, Any]]
 
     def summary(self) -> str:
-        """Return the verdict in a few lines, with what pushes and when."""
-        return '\n'.join([super().summary(), *_pushed(self.pushes)])
+        lines = [f'  {item["test"]}: {item["place"]} {quantity(item["size"], item["unit"])} from '
+                 f'{item["from_s"]:.2f} to {item["until_s"]:.2f} s'
+                 for item in self.pushes[:_PUSHES]]
+        if len(self.pushes) > _PUSHES:
+            lines.append(f'  and {len(self.pushes) - _PUSHES} more, see the JSON')
+        return '\n'.join([super().summary(), *lines])
 
 
 def diagnose_logs(model: Model, logs: Sequence[Log],
@@ -65,17 +67,14 @@ def diagnose_logs(model: Model, logs: Sequence[Log],
     """
     machine = OwnMachine(model, logs)
     check.check_tests(machine)
-    found = diagnose(check.without(machine, without, limits or ()), progress, threads,
-                     _for_derivatives_of(machine, settings), limits, earlier)
+    searched = check.without(machine, without, limits or ())
+    # thresholds with the error that this simulation's derivatives have
+    interval = replace(settings.interval, derivative_error=min(
+        max(derivative_error(machine), _LEAST_ERROR), settings.interval.derivative_error))
+    found = diagnose(searched, progress, threads, replace(settings, interval=interval), limits,
+                     earlier)
     return OwnVerdict(**vars(found), numbers=numbers_as_fitted(
         found.machine, found.best.state.point()), pushes=pushes_found(found, settings))
-
-
-def _for_derivatives_of(machine: OwnMachine, settings: Settings) -> Settings:
-    """Return thresholds with the error that this simulation's derivatives have."""
-    usual = settings.interval.derivative_error
-    error = min(max(derivative_error(machine), _LEAST_ERROR), usual)
-    return replace(settings, interval=replace(settings.interval, derivative_error=error))
 
 
 def numbers_as_fitted(machine: Machine, point: Point) -> dict[str, Any]:
@@ -121,11 +120,3 @@ def pushes_found(verdict: Verdict, settings: Settings = DEFAULT) -> list[dict[st
     problem = LeastSquares(machine, settings=settings)
     return [{'place': best.name, **vars(item), 'unit': place.unit} for item in pushes(
         problem, verdict.none.state.point(), labels[best.name])]
-
-
-def _pushed(pushes: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Return what pushes and when."""
-    lines = [f'  {item["test"]}: {item["place"]} {quantity(item["size"], item["unit"])} from '
-             f'{item["from_s"]:.2f} to {item["until_s"]:.2f} s' for item in pushes[:_PUSHES]]
-    more = len(pushes) - _PUSHES
-    return lines + [f'  and {more} more, see the JSON'] if more > 0 else lines

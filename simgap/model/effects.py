@@ -38,7 +38,6 @@ class OwnCatalogue(Catalogue):
         self._angles = angles
 
     def form_named(self, effect: Effect, name: str) -> Form:
-        """Return the form of an effect by its name; that of a ripple says its order."""
         own = self._declared[effect.id]
         if own.ripple is None:
             return super().form_named(effect, name)
@@ -49,13 +48,11 @@ class OwnCatalogue(Catalogue):
 
     def forms(self, effect: Effect, experiments: Sequence[Experiment],
               residuals: Sequence[FloatArray]) -> Sequence[Form]:
-        """Return the forms that are worth a fit: of a ripple, orders that stand out."""
         own = self._declared[effect.id]
         if own.ripple is None or own.ripple.orders:
             return effect.forms
-        orders = likely_orders(experiments, residuals, self._angles(own.ripple.angle),
-                               _FOUND_ORDERS)
-        return tuple(_ripple_form(own, order) for order in orders)
+        return tuple(_ripple_form(own, order) for order in likely_orders(
+            experiments, residuals, self._angles(own.ripple.angle)))
 
 
 def absent(effect: OwnEffect) -> Iterator[tuple[str, float]]:
@@ -74,7 +71,8 @@ def _effect(item: OwnEffect) -> Effect:
         forms = [Form(form.name, tuple(_parameter(f'{item.name}.{name}', number)
                                        for name, number in form.numbers.items()))
                  for form in item.forms]
-    return Effect(item.name, item.component, item.cause, item.look, tuple(forms),
+    cause = item.cause or item.name.partition('.')[2].replace('_', ' ')
+    return Effect(item.name, item.component, cause, tuple(forms),
                   simpler=(item.simpler,) if item.simpler else ())
 
 
@@ -95,7 +93,7 @@ def _ripple_form(item: OwnEffect, order: float) -> Form:
 
 
 def likely_orders(experiments: Sequence[Experiment], residuals: Sequence[FloatArray],
-                  angles: Sequence[FloatArray], count: int) -> list[float]:
+                  angles: Sequence[FloatArray]) -> list[float]:
     """Return likely orders, half by peak and half by energy, from residuals and angles [rad]."""
     orders = np.arange(_STEP, _GREATEST + _STEP, _STEP)
     energy = np.zeros(orders.size)
@@ -109,7 +107,7 @@ def likely_orders(experiments: Sequence[Experiment], residuals: Sequence[FloatAr
     peak = (energy - usual) / np.sqrt(usual)
     found: list[float] = []
     ranks = [list(np.argsort(by)[::-1]) for by in (peak, energy)]
-    while len(found) < count:
+    while len(found) < _FOUND_ORDERS:
         order = float(orders[ranks[len(found) % 2].pop(0)])
         if order not in found:
             found.append(order)

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """An FMU for co-simulation (FMI 2 or 3) as a simulation, called without a wrapper between."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping
 import ctypes
 from ctypes import c_bool, c_double, c_int, c_size_t, c_void_p
@@ -29,8 +27,6 @@ from simgap.model.simulator import Ports
 _NUMBERS = {'2': ('Real',), '3': ('Float64',)}
 # The greatest status with which a simulation goes on: a warning.
 _WARNING = 1
-# Does a step from a time [s] over a time [s]; False if it failed.
-_Step = Callable[[float, float], bool]
 
 
 class FmuModel:
@@ -40,7 +36,6 @@ class FmuModel:
     longest_step_s = math.inf
 
     def __init__(self, path: Path, ports: Ports) -> None:
-        """Unpack the file, find the variables and make an instance."""
         self._path = path
         self._said = ''
         # lives as long as this object
@@ -135,8 +130,8 @@ class FmuModel:
     def _say(self, text: bytes | None) -> None:
         self._said = one_line((text or b'').decode(errors='replace'))
 
-    def _calls(self) -> tuple[Callable[..., int], Callable[..., int], _Step]:
-        """Return the functions that set the inputs, read the outputs and do a step."""
+    def _calls(self) -> tuple[Callable[..., int], Callable[..., int], Callable[..., bool]]:
+        """Return what sets the inputs, what reads the outputs, and what does a step [s], [s]."""
         library, instance = self._slave.dll, self._slave.component
         if self._version == '2':
             step2 = _function(library.fmi2DoStep, c_void_p, c_double, c_double, c_int)

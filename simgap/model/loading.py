@@ -12,9 +12,6 @@ from simgap.inputs.schema import nearest
 from simgap.model.declared import Model, ModelError
 from simgap.model.model_file import load_model_file
 
-_USUAL_NAME = 'machine'
-_MODEL_FILES = ('.yaml', '.yml')
-
 
 def load_model(place: str) -> Model:
     """
@@ -23,11 +20,11 @@ def load_model(place: str) -> Model:
     Raises ModelError if there is no such file or name, or the file fails; the message says at
     which line. Raises ModuleNotFoundError if mujoco or fmpy, which it needs, is missing.
     """
-    if place.endswith(_MODEL_FILES):
+    if place.endswith(('.yaml', '.yml')):
         return load_model_file(Path(place))
     text, mark, name = place.rpartition(':')
     if not mark or not name.isidentifier():
-        text, name = place, _USUAL_NAME
+        text, name = place, 'machine'
     path = Path(text).resolve()
     if not path.is_file() or path.suffix != '.py':
         raise ModelError(f'--model {place}: no such Python file; give FILE.py:NAME, or '

@@ -3,9 +3,11 @@
 """A model of one's own and the logs of its tests, as a `Machine` of the diagnosis."""
 
 from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 import math
 from threading import RLock
 import traceback
+from typing import Any
 
 import numpy as np
 from simgap.errors import UserError
@@ -30,7 +32,7 @@ class OwnMachine(Machine):
         self.model = model
         self.logs = [model.log(log) if model.log else log for log in logs]
         self._strides = [_stride(log, model.judged_hz) for log in self.logs]
-        self._lock = None if model.parallel else RLock()
+        self._lock: AbstractContextManager[Any] = nullcontext() if model.parallel else RLock()
         self._values = {
             **{name: item.value for name, item in (*model.base.items(), *model.per_test.items())},
             **{name: value for effect in model.effects for name, value in absent(effect)}}
@@ -70,10 +72,10 @@ class OwnMachine(Machine):
         return (self._places.get(parameter) or self._places.get(name) or ('', None))[0]
 
     def _nuisances(self) -> list[Parameter]:
-        found = [_offset(name, item, None) for name, item in self.model.base.items()
+        found = [_offset(name, item) for name, item in self.model.base.items()
                  if not item.is_known]
         for k, log in enumerate(self.logs):
-            found += [_offset(name, item, k, f'{name}[{log.name}]')
+            found += [_offset(f'{name}[{log.name}]', item, k)
                       for name, item in self.model.per_test.items() if not item.is_known]
         for name, item in self.model.readings.items():
             if item.gain > 0.0:
@@ -87,14 +89,12 @@ class OwnMachine(Machine):
         return self.pushed(point, experiment, {})
 
     def predict_until(self, point: Point, experiment: int, until: float) -> FloatArray:
-        """Return the readings of a test; no more than is wanted is simulated."""
         return self.pushed(point, experiment, {}, until)
 
     def simulate_disturbed(self, point: Point, place: DisturbanceInput,
                            course: Course) -> list[FloatArray]:
         name = self.push_at(place.name)
-        size = self.model.push[name].size
-        return [self.pushed(point, k, {name: size * course(log.time)})
+        return [self.pushed(point, k, {name: self.model.push[name].size * course(log.time)})
                 for k, log in enumerate(self.logs)]
 
     def push_at(self, label: str) -> str:
@@ -124,11 +124,8 @@ class OwnMachine(Machine):
     def simulated(self, numbers: Numbers, test: OneTest) -> dict[str, FloatArray]:
         """Return the model's checked readings, shape (n,) each; ModelError if it failed."""
         try:
-            if self._lock is None:
+            with self._lock:
                 found = self.model.simulate(numbers, test)
-            else:
-                with self._lock:
-                    found = self.model.simulate(numbers, test)
         except UserError:
             raise
         except Exception as error:
@@ -138,7 +135,6 @@ class OwnMachine(Machine):
 
     @property
     def time_scales(self) -> TimeScales:
-        """Return how fast the machine is, from the time in which it settles."""
         longest = max(float(e.time[-1] - e.time[0]) for e in self.experiments)
         settles = self.model.settles_s
         if settles is None:
@@ -156,8 +152,7 @@ class OwnMachine(Machine):
         log, time = self.logs[experiment], self.experiments[experiment].time
         name, item = next(iter(self.model.readings.items()))
         position = log[item.column or name][::self._strides[experiment]]
-        rate = np.gradient(position, time)
-        return Motion(time, rate=rate, angle=position,
+        return Motion(time, rate=np.gradient(position, time), angle=position,
                       reversal_s=min(0.4, 2.0 * self.time_scales.start_s))
 
     def _experiment(self, log: Log, stride: int) -> Experiment:
@@ -187,8 +182,8 @@ def _stride(log: Log, judged_hz: float | None) -> int:
     return max(1, round(1.0 / judged_hz / float(np.median(np.diff(log.time)))))
 
 
-def _offset(name: str, item: Number, experiment: int | None, full: str = '') -> Parameter:
-    return Parameter(full or name, item.unit, item.low - item.value, item.high - item.value,
+def _offset(name: str, item: Number, experiment: int | None = None) -> Parameter:
+    return Parameter(name, item.unit, item.low - item.value, item.high - item.value,
                      item.quotient_step, item.sigma, experiment, least_step=item.step)
 
 
@@ -198,9 +193,8 @@ def _error_of_reading(name: str, unit: str, by: float, experiment: int | None) -
 
 def _diagram(model: Model) -> Diagram:
     """Return the blocks in the order of the signal, each with a line to the next."""
-    named = [*(effect.component for effect in model.effects),
-             *(item.component for item in model.push.values())]
-    found = Diagram.of([*model.blocks, *named])
+    found = Diagram.of([*model.blocks, *(effect.component for effect in model.effects),
+                        *(item.component for item in model.push.values())])
     chain = found.blocks[:len(dict.fromkeys(model.blocks))]
     middle = 0.5 * Diagram.height
     lines = []
@@ -237,6 +231,6 @@ def _checked(found: object, readings: Mapping[str, Reading],
 
 def _place(error: Exception) -> str:
     """Return the line of the user's file that an error came from."""
-    frames = traceback.extract_tb(error.__traceback__)
-    inner = [frame for frame in frames if frame.filename != __file__]
+    inner = [frame for frame in traceback.extract_tb(error.__traceback__)
+             if frame.filename != __file__]
     return f'line {inner[0].lineno}: ' if inner else ''

@@ -23,11 +23,9 @@ _TOP = (*_PROGRAMS, 'step_s', 'inputs', 'starts', 'constants', 'base', 'per_test
 # What a number may do, in the order in which it is done. The last one is to an input.
 _ACTS = ('sets', 'scales', 'adds', 'adds_to_inverse', 'delays')
 _KINDS = ('known', 'share', 'by', 'free', 'size', 'shape')
-_OF_NUMBER = ('value', 'start', 'unit', 'step', 'tolerance')
-_OF_EFFECT = ('cause', 'look', 'simpler', 'numbers')
+_OF_EFFECT = ('cause', 'simpler', 'numbers')
 _NUMBER = Entry('')
 _POSITIVE = Entry('', low=1e-12)
-_PAIR = Entry('', lengths=(2, 2))
 # A sample counts as there at a time that differs by less than this share of a step.
 _SAME = 1e-6
 
@@ -52,11 +50,9 @@ def load_model_file(path: Path) -> Model:
     """
     try:
         return _model(path, mapping_of('', read_yaml(path), _TOP))
-    except ParameterError as error:
+    except (ParameterError, ModelError) as error:
         text = str(error)
         raise ModelError(text if text.startswith(str(path)) else f'{path}: {text}') from None
-    except ModelError as error:
-        raise ModelError(f'{path}: {error}') from None
 
 
 def _model(path: Path, top: Mapping[str, Any]) -> Model:
@@ -66,10 +62,10 @@ def _model(path: Path, top: Mapping[str, Any]) -> Model:
     actions = list(_actions(top))
     inputs = _texts('inputs', top)
     starts, constants = _texts('starts', top), _texts('constants', top)
-    readings = {name: (f'readings.{name}', body) for name, body in _bodies(
-        'readings', top, ('from', 'column', *_fields(Reading)))}
-    pushes = {name: (f'push.{name}', body) for name, body in _bodies(
-        'push', top, ('into', *_fields(Push)))}
+    readings = {name: (key, body) for key, name, body in _bodies(
+        'readings', top, ('from', 'column', *Reading.__dataclass_fields__))}
+    pushes = {name: (key, body) for key, name, body in _bodies(
+        'push', top, ('into', *Push.__dataclass_fields__))}
     entries = {str(body.get('into', name)): key for name, (key, body) in pushes.items()}
     for name, (key, body) in pushes.items():
         if entries[str(body.get('into', name))] != key:
@@ -89,19 +85,18 @@ def _model(path: Path, top: Mapping[str, Any]) -> Model:
         if item.target not in given and math.isnan(defaults.get(item.target, 0.0)):
             raise ModelError(f'{item.key}: {item.target}: {top[program[0]]} gives it no value; '
                              'let a number set it first')
-    longest = (_number('step_s', top['step_s'], _POSITIVE) if 'step_s' in top
-               else simulator.longest_step_s)
     simulate = _Simulation(
-        simulator, tuple(ports.places), longest, tuple(sorted(
-            actions, key=lambda item: _ACTS.index(item.act))), inputs, starts, constants,
+        simulator, tuple(ports.places), _optional('step_s', top) or simulator.longest_step_s,
+        tuple(sorted(actions, key=lambda item: _ACTS.index(item.act))), inputs, starts, constants,
         tuple(pushes), {name: list(ports.outputs).index(str(body.get('from', name)))
                         for name, (_, body) in readings.items()})
     return machine(
         simulate,
-        base=dict(_numbers('base', top, defaults)),
-        per_test=dict(_numbers('per_test', top, defaults)),
+        base={name: _declared(key, body, defaults) for key, name, body in _bodies('base', top)},
+        per_test={name: _declared(key, body, defaults)
+                  for key, name, body in _bodies('per_test', top)},
         readings={name: _reading(key, body) for name, (key, body) in readings.items()},
-        effects=[_effect(name, body) for name, body in _bodies('effects', top, _OF_EFFECT)],
+        effects=[_effect(*item) for item in _bodies('effects', top)],
         push={name: _push(key, name, body) for name, (key, body) in pushes.items()},
         settles_s=_optional('settles_s', top), judged_hz=_optional('judged_hz', top),
         blocks=tuple(_list('blocks', top)), advice=tuple(_list('advice', top)),
@@ -123,7 +118,6 @@ class _Simulation:
     readings: Mapping[str, int]  # which output of the program each is
 
     def __call__(self, numbers: Numbers, test: OneTest) -> dict[str, FloatArray]:
-        """Return the readings of a test, had the machine these numbers."""
         time = test.time
         sampled = float(np.median(np.diff(time)))
         step = sampled / max(1, math.ceil(sampled / self.longest_step_s - _SAME))
@@ -186,13 +180,11 @@ def _simulator(program: str, path: Path, ports: Ports) -> Simulator:
 
 def _number_bodies(top: Mapping[str, Any]) -> Iterator[tuple[str, str, Mapping[str, Any]]]:
     """Yield key, name and body of every number of the file."""
-    allowed = (*_KINDS, *_OF_NUMBER, *_ACTS)
-    for where in ('base', 'per_test'):
-        for name, body in _bodies(where, top, allowed):
-            yield f'{where}.{name}', name, body
-    for title, item in _bodies('effects', top, _OF_EFFECT):
-        for name, body in _bodies('numbers', item, allowed, f'effects.{title}.'):
-            yield f'effects.{title}.numbers.{name}', name, body
+    allowed = (*_KINDS, 'value', 'start', 'unit', 'step', 'tolerance', *_ACTS)
+    yield from _bodies('base', top, allowed)
+    yield from _bodies('per_test', top, allowed)
+    for key, _, item in _bodies('effects', top, _OF_EFFECT):
+        yield from _bodies('numbers', item, allowed, f'{key}.')
 
 
 def _actions(top: Mapping[str, Any]) -> Iterator[_Action]:
@@ -217,18 +209,9 @@ def _check_actions(actions: list[_Action], inputs: Mapping[str, str]) -> None:
         if item.act == 'delays' and item.target not in inputs:
             raise ModelError(f'{item.key}: {item.target} is no input; there are '
                              f'{", ".join(inputs) or "none"}')
-        if item.act == 'sets' and item.target in taken:
+        if item.act == 'sets' and taken.setdefault(item.target, item.key) != item.key:
             raise ModelError(f'{item.key}: {item.target}: {taken[item.target]} sets it, too; '
                              'let one of them add or scale')
-        if item.act == 'sets':
-            taken[item.target] = item.key
-
-
-def _numbers(where: str, top: Mapping[str, Any],
-             defaults: Mapping[str, float]) -> Iterator[tuple[str, Number]]:
-    for key, name, body in _number_bodies(top):
-        if key == f'{where}.{name}':
-            yield name, _declared(key, body, defaults)
 
 
 def _declared(key: str, body: Mapping[str, Any], defaults: Mapping[str, float]) -> Number:
@@ -238,16 +221,12 @@ def _declared(key: str, body: Mapping[str, Any], defaults: Mapping[str, float]) 
     if kind == 'known':
         return known(_number(f'{key}.known', body['known']), unit)
     if kind == 'free':
-        low, high = _pair(f'{key}.free', body['free'])
-        start = _value(f'{key}.start', body.get('start'), body, defaults)
-        return free(low, high, unit, start=start, step=step)
+        return free(*_pair(f'{key}.free', body['free']), unit, step=step,
+                    start=_value(f'{key}.start', body.get('start'), body, defaults))
     value = _value(f'{key}.value', body.get('value'), body, defaults)
     if value is None:
         raise ModelError(f'{key}: value: none is given')
-    around = _number(f'{key}.{kind}', body[kind])
-    if kind == 'share':
-        return within(value, around, unit, step=step)
-    return within(value, unit=unit, by=around, step=step)
+    return within(value, unit=unit, step=step, **{kind: _number(f'{key}.{kind}', body[kind])})
 
 
 def _value(key: str, given: object, body: Mapping[str, Any],
@@ -260,22 +239,19 @@ def _value(key: str, given: object, body: Mapping[str, Any],
     return found if math.isfinite(found) else None
 
 
-def _effect(name: str, body: Mapping[str, Any]) -> OwnEffect:
-    key = f'effects.{name}'
+def _effect(key: str, name: str, body: Mapping[str, Any]) -> OwnEffect:
     numbers = {}
-    for one, item in _bodies('numbers', body, None, f'{key}.'):
-        where = f'{key}.numbers.{one}'
+    for where, one, item in _bodies('numbers', body, before=f'{key}.'):
         unit, step = _unit(where, item), _number(f'{where}.step', item.get('step', 0.0))
         if _kind(where, item, ('size', 'shape')) == 'size':
-            low, high = _pair(f'{where}.size', item['size'])
-            numbers[one] = size(low, high, unit, step=step, tolerance=_number(
-                f'{where}.tolerance', item.get('tolerance', 0.0)))
+            numbers[one] = size(
+                *_pair(f'{where}.size', item['size']), unit, step=step,
+                tolerance=_number(f'{where}.tolerance', item.get('tolerance', 0.0)))
         else:
-            low, high = _pair(f'{where}.shape', item['shape'])
-            numbers[one] = shape(low, high, _number(f'{where}.start', item.get('start')), unit,
-                                 step=step)
+            numbers[one] = shape(
+                *_pair(f'{where}.shape', item['shape']),
+                _number(f'{where}.start', item.get('start')), unit, step=step)
     return effect(name, cause=_text(f'{key}.cause', body.get('cause', '')),
-                  look=_text(f'{key}.look', body.get('look', '')),
                   simpler=_text(f'{key}.simpler', body.get('simpler', '')), **numbers)
 
 
@@ -302,14 +278,12 @@ def _push(key: str, name: str, body: Mapping[str, Any]) -> Push:
                 _number(f'{key}.size', body.get('size'), _POSITIVE))
 
 
-def _fields(kind: type) -> tuple[str, ...]:
-    return tuple(kind.__dataclass_fields__)  # type: ignore[attr-defined]
-
-
-def _bodies(where: str, top: Mapping[str, Any], allowed: Collection[str] | None,
-            before: str = '') -> Iterator[tuple[str, Mapping[str, Any]]]:
+def _bodies(where: str, top: Mapping[str, Any], allowed: Collection[str] | None = None,
+            before: str = '') -> Iterator[tuple[str, str, Mapping[str, Any]]]:
+    """Yield key, name and entries of each thing in a part of the file."""
     for name, body in mapping_of(f'{before}{where}', top.get(where) or {}).items():
-        yield str(name), mapping_of(f'{before}{where}.{name}', body, allowed)
+        key = f'{before}{where}.{name}'
+        yield key, str(name), mapping_of(key, body, allowed)
 
 
 def _texts(where: str, top: Mapping[str, Any]) -> dict[str, str]:
@@ -344,5 +318,5 @@ def _optional(key: str, top: Mapping[str, Any]) -> float | None:
 
 
 def _pair(key: str, value: object) -> tuple[float, float]:
-    low, high = _PAIR.check(key, value)  # type: ignore[misc, str-unpack]
+    low, high = Entry('', lengths=(2, 2)).check(key, value)  # type: ignore[misc, str-unpack]
     return float(low), float(high)

@@ -8,8 +8,6 @@ has several values: joint.motor.damping, actuator.servo.biasprm[1], joint.motor.
 starts), or option.gravity[2].
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 import copy
 from pathlib import Path

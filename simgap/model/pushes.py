@@ -117,7 +117,9 @@ def _fitted_levels(machine: OwnMachine, point: Mapping[str, float], name: str,
         parts = [x[:len(numbers)] / sigmas]
         first = len(numbers)
         for k, (log, moments, count) in enumerate(zip(machine.logs, edges, counts, strict=True)):
-            course = _steps(log.time, moments, size * x[first:first + count])
+            # the first and the last level hold beyond the edges, too
+            level = np.clip(np.searchsorted(moments, log.time, side='right') - 1, 0, count - 1)
+            course = size * x[first:first + count][level]
             first += count
             experiment = machine.experiments[k]
             parts.append(np.nan_to_num((machine.pushed(here, k, {name: course})
@@ -135,11 +137,6 @@ def _fitted_levels(machine: OwnMachine, point: Mapping[str, float], name: str,
                            for i, step in enumerate(np.diag(signed))]).T
         x = np.clip(x + lsq_linear(slopes, -here, (low - x, high - x + 1e-12)).x, low, high)
     return list(np.split(size * x[len(numbers):], np.cumsum(counts)[:-1]))
-
-
-def _steps(time: FloatArray, moments: FloatArray, levels: FloatArray) -> FloatArray:
-    """Return levels that hold between moments; the first and last hold beyond them, too."""
-    return levels[np.clip(np.searchsorted(moments, time, side='right') - 1, 0, levels.size - 1)]
 
 
 def merged(spans: Sequence[PushedSpan], alike: float) -> list[PushedSpan]:

@@ -2,9 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """How the readings of a machine of one's own answer to its numbers."""
 
-from __future__ import annotations
-
-from collections.abc import Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 import math
 
@@ -23,28 +21,24 @@ class StepResponse:
     acts: bool  # False if nothing changes
     roughness: float  # share by which the difference quotient changes if its step is doubled
 
-    @classmethod
-    def at(cls, machine: OwnMachine, parameter: Parameter, experiment: int,
-           point: Point) -> StepResponse:
-        """Return the response of one test at a point."""
-        here = point.get(parameter.name, 0.0)
-        signed = parameter.step if here + 2.0 * parameter.step <= parameter.high else (
-            -parameter.step)
-        noise = machine.experiments[experiment].noise
-        before = machine.predict(point, experiment)
-        one, two = ((machine.predict({**point, parameter.name: here + count * signed}, experiment)
-                     - before) / noise for count in (1.0, 2.0))
+
+def responses(machine: OwnMachine, parameter: Parameter, point: Point) -> Iterator[StepResponse]:
+    """Yield how each test on which a number acts answers to a step of it at a point."""
+    here = point.get(parameter.name, 0.0)
+    step = parameter.step if here + 2.0 * parameter.step <= parameter.high else -parameter.step
+    for k, experiment in enumerate(machine.experiments):
+        if parameter.experiment not in (None, k):
+            continue
+        before = machine.predict(point, k)
+        one, two = ((machine.predict({**point, parameter.name: here + count * step}, k)
+                     - before) / experiment.noise for count in (1.0, 2.0))
         there = np.isfinite(one) & np.isfinite(two)
         if not there.any() or float(np.abs(one[there]).max()) < NO_RESPONSE:
-            return cls(False, 0.0)
+            yield StepResponse(False, 0.0)
+            continue
         size = 0.5 * math.sqrt(float(np.mean(two[there] ** 2)))
         off = math.sqrt(float(np.mean((one[there] - 0.5 * two[there]) ** 2)))
-        return cls(True, off / size)
-
-
-def tests_of(machine: OwnMachine, parameter: Parameter) -> Sequence[int]:
-    """Return the tests on which a number acts."""
-    return [k for k in range(len(machine.logs)) if parameter.experiment in (None, k)]
+        yield StepResponse(True, off / size)
 
 
 def where_it_acts(form: Form, parameter: Parameter) -> dict[str, float]:
@@ -58,6 +52,5 @@ def derivative_error(machine: OwnMachine) -> float:
     places += [(parameter, where_it_acts(form, parameter))
                for effect in machine.catalogue.values() for form in effect.forms
                for parameter in form.sizes]
-    return max((StepResponse.at(machine, parameter, k, point).roughness
-                for parameter, point in places for k in tests_of(machine, parameter)),
-               default=0.0)
+    return max((item.roughness for parameter, point in places
+                for item in responses(machine, parameter, point)), default=0.0)

@@ -82,18 +82,14 @@ def refitted(machine: Machine, hypothesis: Hypothesis) -> dict[str, float]:
         return np.array([(residuals(x + step) - here) / signed[i]
                          for i, step in enumerate(np.diag(signed))]).T
 
-    start = np.array([point[p.name] for p in numbers])
     inside = 1e-9 * (high - low)
-    found = least_squares(residuals, np.clip(start, low + inside, high - inside), slopes,
-                          bounds=(low, high), x_scale=high - low, max_nfev=_RUNS)
+    start = np.clip([point[p.name] for p in numbers], low + inside, high - inside)
+    found = least_squares(residuals, start, slopes, bounds=(low, high), x_scale=high - low,
+                          max_nfev=_RUNS)
     return {p.name: float(value) for p, value in zip(numbers, found.x, strict=True)}
 
 
 def _carried(machine: OwnMachine, test: str, point: Point) -> dict[str, float]:
-    """Return the values of a point for another test."""
-    own = {f'{name}[{log.name}]' for name in machine.model.per_test for log in machine.logs}
-    carried = {name: value for name, value in point.items() if name not in own}
-    for name in machine.model.per_test:
-        carried[f'{name}[{test}]'] = float(np.mean(
-            [point.get(f'{name}[{log.name}]', 0.0) for log in machine.logs]))
-    return carried
+    return {**point, **{f'{name}[{test}]': float(np.mean(
+        [point.get(f'{name}[{log.name}]', 0.0) for log in machine.logs]))
+        for name in machine.model.per_test}}

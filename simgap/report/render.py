@@ -36,11 +36,8 @@ def _environment(folder: Path) -> Environment:
     environment = Environment(
         loader=FileSystemLoader([folder, TEMPLATES]), undefined=StrictUndefined, autoescape=True,
         trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True)
-    environment.globals.update(file=_file, plotted=plotted, size=size)
+    # `file` gives a file of this room as it is: a style or a script of our own or of a library
+    environment.globals.update(plotted=plotted, size=size, file=lambda name: Markup(
+        (FOLDER / name).read_text(encoding='utf-8')))
     environment.policies['json.dumps_kwargs'] = {'allow_nan': False}
     return environment
-
-
-def _file(name: str) -> Markup:
-    """Return a file of this room as it is: a style or a script of our own or of a library."""
-    return Markup((FOLDER / name).read_text(encoding='utf-8'))

@@ -10,6 +10,7 @@ import math
 import os
 from pathlib import Path
 import stat
+import sys
 
 from hypothesis import given, strategies as st
 import numpy as np
@@ -104,10 +105,11 @@ class Terminal(io.StringIO):
         return True
 
 
-def test_progress_on_a_terminal() -> None:
+def test_progress_on_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
     """The line starts empty, ends full, and is left behind complete."""
     terminal = Terminal()
-    with Progress('steps', 4, stream=terminal) as progress:
+    monkeypatch.setattr(sys, 'stderr', terminal)
+    with Progress('steps', 4) as progress:
         for done in range(5):
             progress.update(done)
     lines = terminal.getvalue().split('\r')[1:]
@@ -116,18 +118,21 @@ def test_progress_on_a_terminal() -> None:
     assert terminal.getvalue().endswith('\n')
 
 
-def test_progress_of_work_that_fails() -> None:
+def test_progress_of_work_that_fails(monkeypatch: pytest.MonkeyPatch) -> None:
     """Work that fails does not look finished."""
     terminal = Terminal()
-    with pytest.raises(ZeroDivisionError), Progress('steps', 4, stream=terminal):
+    monkeypatch.setattr(sys, 'stderr', terminal)
+    with pytest.raises(ZeroDivisionError), Progress('steps', 4):
         raise ZeroDivisionError
     assert '100 %' not in terminal.getvalue()
 
 
 @pytest.mark.parametrize('stream, quiet', [(Terminal(), True), (io.StringIO(), False)])
-def test_progress_is_quiet(stream: io.StringIO, quiet: bool) -> None:
+def test_progress_is_quiet(stream: io.StringIO, quiet: bool,
+                           monkeypatch: pytest.MonkeyPatch) -> None:
     """Nothing is shown when told so, and nothing of short work into a file or a pipe."""
-    with Progress('steps', 4, quiet=quiet, stream=stream) as progress:
+    monkeypatch.setattr(sys, 'stderr', stream)
+    with Progress('steps', 4, quiet=quiet) as progress:
         progress.update(2)
     assert stream.getvalue() == ''
 
@@ -136,7 +141,8 @@ def test_progress_in_a_log(monkeypatch: pytest.MonkeyPatch) -> None:
     """Long work has a line now and then, which no other overwrites."""
     monkeypatch.setattr(Progress, 'LINE_S', 0.0)
     log = io.StringIO()
-    with Progress('steps', 4, stream=log) as progress:
+    monkeypatch.setattr(sys, 'stderr', log)
+    with Progress('steps', 4) as progress:
         progress.update(2)
     assert [line.split()[0] for line in log.getvalue().splitlines()] == ['steps'] * 2
     assert ' 50 %' in log.getvalue()

@@ -24,7 +24,7 @@ STARTS = (3.0, -2.0)
 def effect(key: str, unit: str, low: float, high: float) -> Effect:
     """Return an effect of one number."""
     number = Parameter(f'{key}.size', unit, low, high, 1e-3)
-    return Effect(key, key.partition('.')[0], 'a cause', 'a look', (Form('', (number,)),))
+    return Effect(key, key.partition('.')[0], 'a cause', (Form('', (number,)),))
 
 
 class Body(Machine):

@@ -18,7 +18,7 @@ TIME: FloatArray = np.arange(50, dtype=np.float64) * 0.1
 NUISANCE = Parameter('spring', '1', -0.1, 0.1, 1e-3, 0.05)
 SIZE = Parameter('shaft.play.size', 'rad', 0.0, 1.0, 1e-3)
 SHAPE = Parameter('shaft.play.shape', '1', 0.5, 2.0, 1e-2, start=1.0, is_shape=True)
-PLAY = Effect('shaft.play', 'shaft', 'wear', 'late', (Form('', (SIZE, SHAPE)),))
+PLAY = Effect('shaft.play', 'shaft', 'wear', (Form('', (SIZE, SHAPE)),))
 TEST = Experiment('step', TIME, ('angle', 'current'), ('rad', 'A'), np.zeros((50, 2)),
                   np.ones((50, 2)))
 

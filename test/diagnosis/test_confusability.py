@@ -25,7 +25,7 @@ class Line(Machine):
         super().__init__([Experiment(
             'line', TIME, ('y',), ('m',), np.zeros((TIME.size, 1)), np.ones((TIME.size, 1)))],
             [Parameter(name, '1', -1e3, 1e3, 1e-3, 300.0) for name in ('zero', 'same', 'slope')],
-            [Effect('body.curve', 'body', '', '', (Form('', (CURVE,)),))])
+            [Effect('body.curve', 'body', '', (Form('', (CURVE,)),))])
 
     def predict(self, point: Point, experiment: int) -> FloatArray:
         """Return a parabola."""
@@ -54,7 +54,7 @@ class Shifted(Machine):
         super().__init__([Experiment(
             'line', TIME, ('y',), ('m',), np.zeros((TIME.size, 1)), np.ones((TIME.size, 1)))],
             [Parameter('zero', 'm', -bound, bound, 1e-3)],
-            [Effect('body.shift', 'body', '', '', (Form('', (SHIFT,)),))])
+            [Effect('body.shift', 'body', '', (Form('', (SHIFT,)),))])
 
     def predict(self, point: Point, experiment: int) -> FloatArray:
         """Return a constant."""

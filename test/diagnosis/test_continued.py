@@ -22,7 +22,7 @@ TRUE = {'string.tension.at_first': 0.23, 'string.tension.gained': 0.05, 'string.
 
 def effect(key: str, *sizes: str) -> Effect:
     """Return an effect of some sizes."""
-    return Effect(key, 'string', '', '', (Form('', tuple(
+    return Effect(key, 'string', '', (Form('', tuple(
         Parameter(f'{key}.{size}', '1', -1.0, 1.0, 1e-4) for size in sizes)),))
 
 

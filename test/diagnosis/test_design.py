@@ -41,7 +41,7 @@ class Lever(Machine):
             [Experiment('next', np.linspace(0.0, 1.0, 60), ('y',), ('m',), np.zeros((60, 1)),
                         np.full((60, 1), sigma), model_error=np.zeros(1))],
             [Parameter('zero', 'm', -1.0, 1.0, 0.01, 0.05)],
-            [Effect(f'lever.{name}', 'lever', '', '', (Form('', (
+            [Effect(f'lever.{name}', 'lever', '', (Form('', (
                 Parameter(f'lever.{name}', '1', -10.0, 10.0, 0.01),)),))
              for name in ('compliance', 'hardening', 'copy')])
 
@@ -248,7 +248,7 @@ class Heated(Loads):
         return lever
 
 
-EXPANSION = Effect('lever.expansion', 'lever', '', '', (Form('', (
+EXPANSION = Effect('lever.expansion', 'lever', '', (Form('', (
     Parameter('lever.expansion', '1', -10.0, 10.0, 0.01),)),))
 
 

@@ -25,7 +25,7 @@ class Curves(Machine):
 
     def __init__(self, x: FloatArray, sigma: float) -> None:
         self.x = x
-        effects = [Effect(f'part.{name}', 'part', '', '', (Form('', tuple(
+        effects = [Effect(f'part.{name}', 'part', '', (Form('', tuple(
             Parameter(f'{name}_{k}', '1', -WIDE, WIDE, 0.01) for k in range(3))),))
             for name in ('waves', 'parabola')]
         super().__init__([Experiment(
@@ -107,7 +107,7 @@ class Tone(Machine):
     def __init__(self) -> None:
         super().__init__([Experiment(
             'one', self.time, ('y',), ('1',), np.zeros((400, 1)), np.ones((400, 1)),
-            model_error=np.zeros(1))], (), [Effect('part.tone', 'part', '', '', (Form('', (
+            model_error=np.zeros(1))], (), [Effect('part.tone', 'part', '', (Form('', (
                 Parameter('frequency', 'Hz', 0.0, 10.0, 1e-4),)),))])
 
     def predict(self, point: Point, experiment: int) -> FloatArray:

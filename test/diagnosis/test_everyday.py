@@ -25,7 +25,7 @@ COURSES = {'gear.ripple': np.sin(3.0 * TIME), 'seal.drag': np.sin(3.2 * TIME),
 
 def effect(key: str, tolerance: float = TOLERANCE) -> Effect:
     size = Parameter(f'{key}.size', 'm', -2.0, 2.0, 1e-3, tolerance=tolerance)
-    return Effect(key, key.partition('.')[0], '', '', (Form('', (size,)),))
+    return Effect(key, key.partition('.')[0], '', (Form('', (size,)),))
 
 
 class Table(Machine):

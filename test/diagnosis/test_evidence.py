@@ -35,7 +35,7 @@ class Linear(Machine):
         super().__init__(
             [Experiment('one', np.linspace(0.0, 1.0, measured.size), ('y',), ('1',),
                         measured[:, np.newaxis], np.full((measured.size, 1), NOISE))],
-            numbers[:1], [Effect(p.name[0], 'part', '', '', (Form('', (p,)),))
+            numbers[:1], [Effect(p.name[0], 'part', '', (Form('', (p,)),))
                           for p in numbers[1:]])
 
     def predict(self, point: Point, experiment: int) -> FloatArray:

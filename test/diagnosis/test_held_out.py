@@ -21,7 +21,7 @@ from simgap.verdict.held_out import block_sums, explained_fraction, held_out
 TIME: FloatArray = np.arange(2000, dtype=np.float64) * 0.01
 SIZE = Parameter('spring.rate.size', '1', -10.0, 10.0, 1e-3)
 ZERO = Parameter('zero', '1', -1.0, 1.0, 1e-3, 0.5)
-EFFECT = Effect('spring.rate', 'spring', '', '', (Form('', (SIZE,)),))
+EFFECT = Effect('spring.rate', 'spring', '', (Form('', (SIZE,)),))
 
 
 class Ramp(Machine):

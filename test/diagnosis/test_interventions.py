@@ -23,7 +23,7 @@ LOADS = tuple({'load': value} for value in 'AABB')
 
 def effect(key: str, unit: str, low: float, high: float) -> Effect:
     number = Parameter(f'{key}.size', unit, low, high, 1e-3)
-    return Effect(key, key.partition('.')[0], 'a cause', 'a look', (Form('', (number,)),))
+    return Effect(key, key.partition('.')[0], 'a cause', (Form('', (number,)),))
 
 
 class Body(Machine):

@@ -32,7 +32,7 @@ class Decay(Machine):
         super().__init__(
             [Experiment('toy', time, ('y',), ('1',), clean[:, np.newaxis],
                         np.full((400, 1), noise))],
-            [OFFSET], [Effect('toy.rate', 'toy', '', '', (Form('', (RATE,)),))])
+            [OFFSET], [Effect('toy.rate', 'toy', '', (Form('', (RATE,)),))])
 
     def predict(self, point: Point, experiment: int) -> FloatArray:
         """Return the closed form."""

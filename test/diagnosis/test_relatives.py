@@ -63,8 +63,8 @@ class Scale(Machine):
         super().__init__(
             [Experiment('read', TIME, ('place',), ('m',), made, np.full_like(made, NOISE))],
             [Parameter('drift', 'm/s', -0.02, 0.02, 1e-3, 0.01)],
-            [Effect('scale.wave', 'scale', '', '', (Form('', wave),), simpler=('scale.zero',)),
-             Effect('scale.zero', 'scale', '', '', (Form('', (
+            [Effect('scale.wave', 'scale', '', (Form('', wave),), simpler=('scale.zero',)),
+             Effect('scale.zero', 'scale', '', (Form('', (
                  Parameter('scale.zero.size', 'm', -2e3, 2e3, 1e-2),)),))])
 
     def predict(self, point: Point, experiment: int) -> FloatArray:

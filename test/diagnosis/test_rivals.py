@@ -30,7 +30,7 @@ class Gauge(Machine):
             [Experiment('one', time, ('y',), ('m',), ((1.0 + gain) * time + noise)[:, np.newaxis],
                         np.full((time.size, 1), sigma), model_error=np.zeros(1))],
             [Parameter('zero', 'm', -1.0, 1.0, 0.01, 0.05)],
-            [Effect('gauge.gain', 'gauge', '', '', (Form('', (size,)),))])
+            [Effect('gauge.gain', 'gauge', '', (Form('', (size,)),))])
 
     def predict(self, point: Point, experiment: int) -> FloatArray:
         time = self.experiments[experiment].time

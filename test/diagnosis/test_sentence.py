@@ -18,7 +18,7 @@ from simgap.verdict.sentence import headline, said
 from simgap.verdict.spoken import number, percent
 
 GAP = Parameter('gearbox.backlash.gap', 'rad', 0.0, 1.0, 0.01)
-EFFECTS = {'gearbox.backlash': Effect('gearbox.backlash', 'gearbox', 'worn {teeth}', '',
+EFFECTS = {'gearbox.backlash': Effect('gearbox.backlash', 'gearbox', 'worn {teeth}',
                                       (Form('', (GAP,)),))}
 FOUND = Named(['gearbox.backlash'], 0.97, {
     GAP.name: {'value': 0.03, 'ci95': [0.02, 0.04], 'unit': 'rad'}})

@@ -20,8 +20,8 @@ PARTS = 6
 
 def effect(key: str) -> Effect:
     """Return an effect of one number."""
-    return Effect(key, 'string', '', '', (Form('', (Parameter(f'{key}.size', '1', -1.0, 1.0,
-                                                              1e-4),)),))
+    return Effect(key, 'string', '', (Form('', (
+        Parameter(f'{key}.size', '1', -1.0, 1.0, 1e-4),)),))
 
 
 class String(Machine):

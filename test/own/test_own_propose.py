@@ -14,7 +14,7 @@ import numpy as np
 from own.swing import NOISE, RATE_NOISE, swing
 import pytest
 import simgap
-from simgap.model import effect, Log, Model, ModelError, own_tests, read_log, size
+from simgap.model import effect, Log, Model, ModelError, OwnTests, read_log, size
 from simgap.next_test.design import DesignEffort, TestDesign
 from simgap.next_test.investigation import DECIDED, InvestigationPlan
 from simgap.next_test.rivals import Findings
@@ -53,7 +53,7 @@ def rivals() -> list[Rival]:
 
 
 def test_the_limit_of_a_reading_is_kept() -> None:
-    found = TestDesign(own_tests(model(), 10.0), Findings(rivals()), effort=SMALL).run()
+    found = TestDesign(OwnTests(model(), 10.0), Findings(rivals()), effort=SMALL).run()
     best = found.tests[0]
     assert best.test.constants['height'] <= SMALL.margin * 1.5
     assert found.refused == {'angle': sum(found.refused.values())}
@@ -61,7 +61,7 @@ def test_the_limit_of_a_reading_is_kept() -> None:
 
 
 def test_readings_of_a_planned_test_have_the_errors_of_a_model() -> None:
-    space = own_tests(model(), 10.0)
+    space = OwnTests(model(), 10.0)
     machine = space.machine(space.draw('push-off', np.random.default_rng(1)))
     [experiment] = machine.experiments
     assert experiment.model_error == pytest.approx(3e-3 * experiment.measured.std(axis=0))
@@ -70,7 +70,7 @@ def test_readings_of_a_planned_test_have_the_errors_of_a_model() -> None:
 
 def test_a_model_without_tests_says_what_it_lacks() -> None:
     with pytest.raises(ModelError, match='does not say what a test may be'):
-        own_tests(model(tests={}), 10.0)
+        OwnTests(model(tests={}), 10.0)
 
 
 @pytest.mark.parametrize('changes, words', [

@@ -76,8 +76,8 @@ def diagnosis(result: dict[str, Any], read: Sequence[int] = (1,), **machine: Any
     model = SimpleNamespace(
         experiments=[Experiment(name, TIME, ('speed', HOSTILE), ('m/s', 'V'), measured,
                                 np.full_like(true, 0.1)) for name in (HOSTILE, 'second')],
-        catalogue={'motors.friction': Effect('motors.friction', 'motors', HOSTILE, '', ()),
-                   'dial.gain': Effect('dial.gain', 'dial', 'a bent needle', '', ())},
+        catalogue={'motors.friction': Effect('motors.friction', 'motors', HOSTILE, ()),
+                   'dial.gain': Effect('dial.gain', 'dial', 'a bent needle', ())},
         **{'diagram': None, 'advice': (), 'words': {},
            'simulate': lambda points: [[true - 1.0] * 2, [true] * 2, [true] * 2], **machine})
     fit: Any = SimpleNamespace(state=SimpleNamespace(point=dict), forms=())

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -183,6 +184,28 @@ def test_gaps_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> No
                header='time_s,x', comments='')
     _, told = inspected(tmp_path / 'a.csv', capsys)
     assert '# a gap from 0.99 to 1.3 s' in told
+
+
+def test_what_was_found_is_plain_data_too(tmp_path: Path,
+                                          capsys: pytest.CaptureFixture[str]) -> None:
+    time = np.delete(0.01 * np.arange(300), slice(100, 130))
+    np.savetxt(tmp_path / 'a.csv', np.column_stack([time, np.sin(time), 0.0 * time + 0.3]),
+               delimiter=',', header='time_s,angle_rad,I_A', comments='')
+    _, told = inspected(tmp_path / 'a.csv', capsys)
+    assert main(['inspect', str(tmp_path / 'a.csv'), '--json', '-']) == 0
+    answer = capsys.readouterr()
+    assert answer.err == told
+    found = json.loads(answer.out)
+    tree = parse_yaml(told)
+    assert {**found['entries'], 'signals': {
+        name: signal['entry'] for group in found['groups']
+        for name, signal in group['signals'].items() if signal['moves']}} == tree
+    [group] = found['groups']
+    assert group['samples'] == 270 and group['length_s'] == pytest.approx(2.99)
+    assert group['gaps_s'] == [pytest.approx([0.99, 1.3])]
+    still = group['signals']['I_A']
+    assert (still['least'], still['greatest'], still['moves']) == (0.3, 0.3, False)
+    assert still['suspicions'] == ['stands at 0.3 all the time']
 
 
 def test_nothing_to_say_is_no_success(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -21,7 +21,7 @@ import simgap.cli
 from simgap.errors import UserError
 from simgap.logs.column_map import parse_map
 from simgap.logs.log import Log, LogError, read_log
-from simgap.logs.mapped import read_mapped
+from simgap.logs.mapped import read_file
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 STORE.register(get_types_from_msg('float64 angle\nfloat32[3] current\nuint16 mode\n',
@@ -127,9 +127,9 @@ def test_joint_states_of_a_rosbag2(plugin: StoragePlugin, packed: CompressionMod
     ('/joint_states.header.stamp', STAMPS)])
 def test_the_time_of_a_bag_is_found_or_chosen(column: str, stamps: Any, tmp_path: Path) -> None:
     write_rosbag2(tmp_path / 'run', StoragePlugin.MCAP, JOINTS)
-    found = read_mapped(tmp_path / 'run', parse_map({
+    found = read_file(tmp_path / 'run', parse_map({
         'time': {'column': column, 'unit': 'ms'}, 'signals': {'a': JOINT_SIGNALS['angle']}}))
-    assert found['a'].time_ns.tolist() == stamps.tolist()
+    assert found.channels['a'].time_ns.tolist() == stamps.tolist()
 
 
 def test_what_ros_2_itself_has_packed(tmp_path: Path) -> None:
