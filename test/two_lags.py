@@ -37,7 +37,7 @@ class TwoLags(Machine):
             [Experiment('one', TIME, ('seen left', 'seen right'), ('m', 'm'), measured,
                         np.full_like(measured, NOISE))],
             [Parameter('zero', 'm', -0.01, 0.01, 1e-4, 0.005)],
-            [Effect('left.step', 'left', '', '', (Form('', (number,)),))])
+            [Effect('left.step', 'left', '', (Form('', (number,)),))])
 
     def predict(self, point: Point, experiment: int) -> FloatArray:
         """Return both readings."""

@@ -49,7 +49,8 @@ def concluded(machine: Machine, progress: Callable[[float, str], None], threads:
     stated = with_noise_left(machine, point, settings.noise, 1.0)
     places = unknown_input.places(LeastSquares(stated, settings=settings), point)
     decision = verdict.decide(found, places, enough(found.problem))
-    if decision.unknown >= settings.verdict.partly:
+    if decision.unknown >= settings.verdict.partly and (
+            verdict.beyond_price(found, places) <= 0.0):
         # a place is not to blame for what pulses cannot follow, nor for more than its everyday
         machine = machine.with_experiments([replace(e, process=None) for e in machine.experiments])
         places = unknown_input.places(LeastSquares(machine, settings=settings), point)

@@ -80,11 +80,14 @@ def unknown_probability(found: Found, places: Sequence[Place]) -> float:
     whole = 1.0 + 2.0 * evidence.gain / (evidence.temperature * evidence.samples)
     explained = max((place.explained for place in places), default=0.0) / whole
     beyond = math.log(max(explained, 1e-9) / settings.left) / settings.left_width
-    # a law pays what a further effect pays
-    lawful = max((place.law.evidence for place in places if place.law),
-                 default=0.0) - evidence.further
-    share = 0.5 * (1.0 + math.tanh(0.5 * max(beyond, lawful)))
+    share = 0.5 * (1.0 + math.tanh(0.5 * max(beyond, beyond_price(found, places))))
     return settings.least_unknown + (settings.most_unknown - settings.least_unknown) * share
+
+
+def beyond_price(found: Found, places: Sequence[Place]) -> float:
+    """Return by how much the likeliest law gains more than what a further effect has to pay."""
+    return max((place.law.evidence for place in places if place.law),
+               default=0.0) - found.evidence.further
 
 
 def confusable(found: Found) -> list[list[str]]:
