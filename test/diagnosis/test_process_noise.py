@@ -25,7 +25,7 @@ def test_what_the_process_does_is_its_conditional_mean() -> None:
     residual = noise * RANDOM.normal(size=noise.shape) + process @ RANDOM.normal(size=5)
     measured = residual.copy()
     measured[3, 1] = residual[3, 1] = np.nan
-    experiment = Experiment('test', np.arange(COUNT // 2), ('a', 'b'), ('1', '1'), measured, noise,
+    experiment = Experiment('test', np.arange(0.0, COUNT // 2), ('a', 'b'), ('1', '1'), measured, noise,
                             process=process)
     left = without_process(experiment, residual, bound=1e9)
     # of jointly normal numbers
@@ -38,6 +38,7 @@ def test_what_the_process_does_is_its_conditional_mean() -> None:
 
 
 def test_without_a_process_nothing_is_taken_away() -> None:
-    experiment = Experiment('test', np.arange(3), ('a',), ('1',), np.ones((3, 1)), np.ones((3, 1)))
+    ones = np.ones((3, 1))
+    experiment = Experiment('test', np.arange(0.0, 3.0), ('a',), ('1',), ones, ones)
     residual = np.array([[1.0], [2.0], [np.nan]])
     assert without_process(experiment, residual, 5.0) is residual
