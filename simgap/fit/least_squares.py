@@ -84,11 +84,12 @@ class LeastSquares:
         return self._without_process(k, self._scaled(k, changes) / self.scale)
 
     def _scaled(self, k: int, changes: FloatArray) -> FloatArray:
-        experiment = self.experiments[k]
+        experiment, bound = self.experiments[k], self.settings.fit.runaway
         z = changes / experiment.noise[..., np.newaxis]
         for c, colour in enumerate(experiment.colours):
             z[:, c] = innovations(z[:, c].T, colour).T
-        z = z.reshape(self.sizes[k], -1)
+        # what diverged with a change is a bad derivative, not an error
+        z = np.clip(np.nan_to_num(z.reshape(self.sizes[k], -1)), -bound, bound)
         z[~self.valid[self.rows(k)]] = 0.0
         return np.asarray(z)
 
@@ -173,7 +174,8 @@ class LeastSquares:
             for k in range(len(self.experiments)):
                 if (response := self.machine.linear_response(item.name, k)) is None:
                     return None
-                column[self.rows(k)] = self.whitened(k, response[..., np.newaxis])[:, 0]
+                change = item.step * response[..., np.newaxis]
+                column[self.rows(k)] = self.whitened(k, change)[:, 0] / item.step
             self._linear[item.name] = column
         return self._linear[item.name]
 

@@ -81,14 +81,14 @@ class Evidence:
     def price(self, forms: Sequence[Form]) -> float:
         """Return what a hypothesis has to pay for effects of these forms."""
         sought = self.settings.sought * sum(form.scanned for form in forms)
-        shows = self.settings.shows / self.scale ** 2
-        return sought + min(len(forms), 1) * shows + max(len(forms) - 1, 0) * self.further
+        shows = len(forms) * self.settings.shows / self.scale ** 2
+        error = self.settings.form_error ** 2 * self.gain / self.temperature
+        return shows + sought + max(len(forms) - 1, 0) * error
 
     @property
-    def further(self) -> float:
-        """Return what an effect has to gain beside those that the best has."""
-        return (self.settings.shows / self.scale ** 2
-                + self.settings.form_error ** 2 * self.gain / self.temperature)
+    def whole(self) -> float:
+        """Return the whole gap: what the best gains and what it leaves [half chi-square]."""
+        return self.gain / self.temperature + 0.5 * self.samples
 
     def ranked(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
         """Return hypotheses, the best first."""

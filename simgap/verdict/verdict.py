@@ -75,19 +75,20 @@ def ranked(found: Found, unknown: float) -> list[Answer]:
 
 def unknown_probability(found: Found, places: Sequence[Place]) -> float:
     """Return the probability that something outside the catalogue is at work."""
-    settings, evidence = found.problem.settings.verdict, found.evidence
+    settings = found.problem.settings.verdict
     # of the whole gap, because the form of a named effect errs in proportion to what it does
-    whole = 1.0 + 2.0 * evidence.gain / (evidence.temperature * evidence.samples)
-    explained = max((place.explained for place in places), default=0.0) / whole
+    left, whole = 0.5 * found.evidence.samples, found.evidence.whole
+    explained = max((place.explained for place in places), default=0.0) * left / whole
     beyond = math.log(max(explained, 1e-9) / settings.left) / settings.left_width
     share = 0.5 * (1.0 + math.tanh(0.5 * max(beyond, beyond_price(found, places))))
     return settings.least_unknown + (settings.most_unknown - settings.least_unknown) * share
 
 
 def beyond_price(found: Found, places: Sequence[Place]) -> float:
-    """Return by how much the likeliest law gains more than what a further effect has to pay."""
-    return max((place.law.evidence for place in places if place.law),
-               default=0.0) - found.evidence.further
+    """Return by how much the likeliest law gains more than it has to pay."""
+    settings = found.evidence.settings
+    return max((place.law.evidence for place in places if place.law), default=0.0) - (
+        settings.shows + settings.form_error ** 2 * found.evidence.whole)
 
 
 def confusable(found: Found) -> list[list[str]]:

@@ -107,6 +107,26 @@ def test_a_rounding_error_at_a_bound_leaves_the_derivative() -> None:
         np.testing.assert_allclose(found[:, 0], (np.exp(-time) - 1.0) / 0.01, rtol=1e-5)
 
 
+class Diverging(Decay):
+    """The same, whose offset is taken as linear from a run that diverged half-way."""
+
+    diverged = np.inf
+
+    def linear_response(self, name: str, experiment: int) -> FloatArray | None:
+        """Return one, and what is no number later."""
+        late = self.experiments[experiment].time > 1.5
+        return np.where(late, self.diverged, 1.0)[:, np.newaxis] if name == 'offset' else None
+
+
+@pytest.mark.parametrize('value', [np.inf, -np.inf, np.nan, 1e300])
+def test_a_linear_response_that_diverged_leaves_a_fit_finite(value: float) -> None:
+    model = Diverging(0.7, 0.01)
+    model.diverged = value
+    problem = LeastSquares(model)
+    state = problem.fit(problem.start((OFFSET, RATE), {}), 20)
+    assert np.isfinite(state.jacobian).all() and math.isfinite(state.cost)
+
+
 def test_what_was_not_measured_counts_for_nothing() -> None:
     model = Decay(0.7, 0.01)
     model.experiments[0].measured[100:] = np.nan

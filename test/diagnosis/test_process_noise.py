@@ -25,8 +25,8 @@ def test_what_the_process_does_is_its_conditional_mean() -> None:
     residual = noise * RANDOM.normal(size=noise.shape) + process @ RANDOM.normal(size=5)
     measured = residual.copy()
     measured[3, 1] = residual[3, 1] = np.nan
-    experiment = Experiment('test', np.arange(0.0, COUNT // 2), ('a', 'b'), ('1', '1'), measured, noise,
-                            process=process)
+    experiment = Experiment('test', np.arange(0.0, COUNT // 2), ('a', 'b'), ('1', '1'), measured,
+                            noise, process=process)
     left = without_process(experiment, residual, bound=1e9)
     # of jointly normal numbers
     there = np.isfinite(residual).ravel()
