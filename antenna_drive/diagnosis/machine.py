@@ -15,8 +15,7 @@ from threading import Lock
 from typing import Any
 
 from antenna_drive.diagnosis.advice import ADVICE
-from antenna_drive.diagnosis.antenna_catalogue import AntennaCatalogue
-from antenna_drive.diagnosis.catalogue import catalogue, EXTRA_MODE
+from antenna_drive.diagnosis.catalogue import AntennaCatalogue, catalogue, EXTRA_MODE
 from antenna_drive.diagnosis.diagram import DIAGRAM
 from antenna_drive.diagnosis.disturbances import disturbances, DriveDisturbance
 from antenna_drive.diagnosis.excitation import Longest
@@ -122,8 +121,7 @@ class AntennaMachine(Machine):
         self._run_modifiers, self._reading_modifiers = modifiers.of_runs, modifiers.of_readings
         super().__init__((), AntennaNuisances(tolerances, self._tests, modifiers),
                          AntennaCatalogue((tolerated(effect, tolerances)
-                                           for effect in effects.values()),
-                                          modifiers, self._digit > 0.0))
+                                           for effect in effects.values()), modifiers))
         self.disturbance_inputs = tuple(disturbances(everyday_wind_torque(self._tests[0])))
         self.experiments = self._experiments({})
         self.planning = {'sheet': sheet_tree(_in_common(test.sheet for test in self._tests))}
