@@ -14,7 +14,6 @@ import math
 from threading import Lock
 from typing import Any
 
-from antenna_drive.diagnosis.advice import ADVICE
 from antenna_drive.diagnosis.catalogue import AntennaCatalogue, catalogue, EXTRA_MODE
 from antenna_drive.diagnosis.diagram import DIAGRAM
 from antenna_drive.diagnosis.disturbances import disturbances, DriveDisturbance
@@ -28,7 +27,7 @@ from antenna_drive.diagnosis.tolerances import (
     AntennaNuisances, everyday_wind_torque, nuisances, tolerated,
 )
 from antenna_drive.diagnosis.waves import fastest_wave, is_there
-from antenna_drive.diagnosis.words import words
+from antenna_drive.diagnosis.words import advice, words
 from antenna_drive.emulator import batch
 from antenna_drive.parameters.sets import Drive
 from antenna_drive.readings import AT, NAMED, READINGS, SIGNALS
@@ -90,7 +89,6 @@ class AntennaMachine(Machine):
     catalogue: AntennaCatalogue
     time_scales = _TIME_SCALES
     diagram = DIAGRAM
-    advice = ADVICE
 
     def __init__(self, recordings: Mapping[str, Recording], drive: Drive,
                  threads: int = 2) -> None:
@@ -116,6 +114,7 @@ class AntennaMachine(Machine):
         self._digit = _coarser_digit(self._tests)
         tolerances = nuisances(self._tests, max(given, default=_TOLERANCE))
         effects = catalogue(self._digit)
+        self.advice = advice()
         self.words = words(effects.values(), drive, self._tests[0].record)
         modifiers = KnownModifiers()
         self._run_modifiers, self._reading_modifiers = modifiers.of_runs, modifiers.of_readings
