@@ -1,20 +1,22 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""A recorded test, prepared for comparison: the command, the bias and the readings."""
+"""A recorded test, prepared for comparison: the command, the bias, the readings, the steps."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 import math
-from typing import Any
+from typing import Any, TypeAlias
 
-from antenna_drive.diagnosis.excitation import Bias, CommandedRate, Longest, schedule, SheetCommand
+from antenna_drive.diagnosis.excitation import (
+    Bias, CommandedRate, Longest, schedule, SheetCommand, with_bias,
+)
 from antenna_drive.diagnosis.field_recording import FieldRecording, Note
 from antenna_drive.diagnosis.inference import completed
 from antenna_drive.diagnosis.late_readings import dense, lagging, Outputs, parts_of, read_at
-from antenna_drive.diagnosis.modifiers import SensorReadings
+from antenna_drive.diagnosis.modifiers import RunSetup, SensorReadings
 from antenna_drive.diagnosis.recorded_command import RecordedCommand
 from antenna_drive.diagnosis.sensors import SensorModel, slips
 from antenna_drive.diagnosis.sheet_settings import as_the_sheet_says
@@ -42,6 +44,10 @@ _ANGLE_S = 0.1
 # What the command did in a hole of the recording is forgotten after this time, as far as the mean
 # in it does not tell [s].
 _FORGOTTEN_S = 2.0
+# Tables that are kept: a test has one for each bias voltage and each wave.
+_KEPT_PLANS = 24
+# By number: late jumps of the command [s], or other means in its holes [rad/s].
+_Numbered: TypeAlias = tuple[tuple[int, float], ...]
 
 
 @dataclass(frozen=True)
@@ -128,6 +134,33 @@ class FieldTest:
         rate = self.command(np.linspace(self.time[0], self.time[-1], _LOOKS))
         early, late = (np.count_nonzero(np.diff(np.sign(part))) for part in np.split(rate, 2))
         return bool(max(early, late) <= _SWEEP * (min(early, late) + 1))
+
+
+class Plans:
+    """The tables of steps of some tests, which are kept while runs differ in numbers alone."""
+
+    def __init__(self, tests: Sequence[FieldTest]) -> None:
+        self._tests = tests
+        self._kept = lru_cache(_KEPT_PLANS)(self._made)
+
+    def steps(self, k: int, run: RunSetup, longest: Longest) -> batch.Schedule:
+        """Return the steps of a run of test k, none of which is longer than allowed."""
+        return self._kept(k, longest, run.delay, tuple(run.late_jumps.items()),
+                          tuple(run.hole_means.items()), run.bias)
+
+    def _made(self, k: int, longest: Longest, delay: float, late_jumps: _Numbered,
+              hole_means: _Numbered, bias: Bias) -> batch.Schedule:
+        test = self._tests[k]
+        if bias != test.bias:
+            return with_bias(
+                self._kept(k, longest, delay, late_jumps, hole_means, test.bias), bias)
+        command = test.command
+        if isinstance(command, RecordedCommand):
+            for number, later in late_jumps:
+                command = command.with_jump(number, later)
+            for number, more in hole_means:
+                command = command.with_mean(number, more)
+        return schedule(command, bias, test.output_times, longest, delay)
 
 
 def prepared(recordings: Mapping[str, Recording], drive: Drive, note: Note) -> list[FieldTest]:
