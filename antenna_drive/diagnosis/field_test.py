@@ -46,8 +46,8 @@ _ANGLE_S = 0.1
 _FORGOTTEN_S = 2.0
 # Tables that are kept: a test has one for each bias voltage and each wave.
 _KEPT_PLANS = 24
-# By number: late jumps of the command [s], or other means in its holes [rad/s].
-_Numbered: TypeAlias = tuple[tuple[int, float], ...]
+# What no sample of a command shows, see `RunSetup.unrecorded`.
+_Unrecorded: TypeAlias = tuple[tuple[tuple[str, int], float], ...]
 
 
 @dataclass(frozen=True)
@@ -145,21 +145,19 @@ class Plans:
 
     def steps(self, k: int, run: RunSetup, longest: Longest) -> batch.Schedule:
         """Return the steps of a run of test k, none of which is longer than allowed."""
-        return self._kept(k, longest, run.delay, tuple(run.late_jumps.items()),
-                          tuple(run.hole_means.items()), run.bias)
+        return self._kept(k, longest, run.delay, tuple(run.unrecorded.items()), run.bias)
 
-    def _made(self, k: int, longest: Longest, delay: float, late_jumps: _Numbered,
-              hole_means: _Numbered, bias: Bias) -> batch.Schedule:
+    def _made(self, k: int, longest: Longest, delay: float, unrecorded: _Unrecorded,
+              bias: Bias) -> batch.Schedule:
         test = self._tests[k]
         if bias != test.bias:
-            return with_bias(
-                self._kept(k, longest, delay, late_jumps, hole_means, test.bias), bias)
+            return with_bias(self._kept(k, longest, delay, unrecorded, test.bias), bias)
         command = test.command
         if isinstance(command, RecordedCommand):
-            for number, later in late_jumps:
-                command = command.with_jump(number, later)
-            for number, more in hole_means:
-                command = command.with_mean(number, more)
+            # jumps move before means change
+            for (what, number), value in sorted(unrecorded, key=lambda item: item[0][0]):
+                change = command.with_jump if what == 'jump' else command.with_mean
+                command = change(number, value)
         return schedule(command, bias, test.output_times, longest, delay)
 
 

@@ -257,7 +257,7 @@ class AntennaMachine(Machine):
              channels: tuple[str, ...] = SIGNALS) -> Outputs:
         test = self._tests[job.experiment]
         kind = test.record.dtype
-        run = RunSetup(test.record.view(np.float64).copy(), kind, float(test.time[-1]), test.bias,
+        run = RunSetup(test.record.view(np.float64).copy(), kind, test.bias,
                        start_angle=test.start_angle)
         for name, value in job.items:
             self._modifiers.of_runs[name][0].apply(run, value)
@@ -283,13 +283,10 @@ class AntennaMachine(Machine):
         wanted = (*channels, *(f'{motor}/angle' for motor in rippling.values()))
         time = test.output_times
         samples = int(np.count_nonzero(time - time[0] < job.until))
-        if samples == time.size:
-            out = batch.run(record, plan, channels=wanted)
-        else:
-            steps = int(np.argmax(plan.keep == samples - 1))
-            out = np.full((time.size, len(wanted), 2), np.nan)
-            out[:samples] = batch.run(record, batch.Schedule(
-                plan.steps[:steps], plan.keep[:steps + 1]), channels=wanted)
+        steps = int(np.argmax(plan.keep == samples - 1))
+        out = np.full((time.size, len(wanted), 2), np.nan)
+        out[:samples] = batch.run(record, replace(
+            plan, steps=plan.steps[:steps], keep=plan.keep[:steps + 1]), channels=wanted)
         return Outputs(out[:, :len(channels)], {
             name: RipplingTachometer(out[:, row, 0], record[motor]['tachometer'])
             for row, (name, motor) in enumerate(rippling.items(), len(channels))})

@@ -156,12 +156,12 @@ def _of_a_test(k: int, test: FieldTest, tolerance: float) -> Iterator[AntennaPar
             name = f'jump:{test.name}:{begin:.3f}'
             earlier, later = command.slack[i].tolist()
             half = 0.5 * (later - earlier)
-            yield replace(_within(name, 's', half, Unrecorded('late_jumps', i), k), low=earlier,
+            yield replace(_within(name, 's', half, Unrecorded('jump', i), k), low=earlier,
                           high=later)
 
         for i, (begin, _) in enumerate(command.holes):
             yield _within(f'hole:{test.name}:{begin:.3f}', 'rad/s',
-                          2.0 * float(command.uncertainty[i]), Unrecorded('hole_means', i), k)
+                          2.0 * float(command.uncertainty[i]), Unrecorded('mean', i), k)
 
     given = _allowed([test])
     if given.clock_ppm:
