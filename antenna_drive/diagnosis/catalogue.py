@@ -10,17 +10,18 @@ A new effect takes one term in `physics` (with a neutral default in `parameters.
 here with its numbers and what they do (see `modifiers`), and its words in `words.yaml`.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
 from antenna_drive.diagnosis.modifiers import (
-    add, AntennaParameter, Modifier, RecorderError, Rounding, scale, set_to, WaveShape,
+    add, AntennaParameter, KnownModifiers, Modifier, RecorderError, Rounding, scale, set_to,
+    WaveShape,
 )
-from antenna_drive.diagnosis.waves import wave
+from antenna_drive.diagnosis.waves import likely_orders, Wave, wave
 from antenna_drive.diagnosis.words import row_of
 from antenna_drive.readings import NAMED
-from simgap.machine.contract import Effect, Form
+from simgap.machine.contract import Catalogue, Effect, Experiment, FloatArray, Form
 
 # The motors of an effect, for one motor or both.
 MOTORS: Mapping[str, tuple[str, ...]] = {
@@ -33,6 +34,8 @@ _ENCODER_ORDERS = tuple(20.0 * 1.01 ** k for k in range(830))
 EXTRA_MODES = tuple(0.6 * 1.14 ** k for k in range(23))
 # The mode of that effect: the record has room for it, the configuration does not have it.
 EXTRA_MODE = 3
+# Orders that are tried of each wave.
+_ORDERS = 3
 # The form of a quantisation whose digit the readings tell.
 DIGITS_SEEN = 'digits seen'
 
@@ -171,10 +174,9 @@ def _axis_effects() -> Iterator[Effect]:
         yield _effect(component, name, _number(
             'torque', 'N m', -1e6, 1e6, 500.0, add(f'{axis}.{field}'), healthy=1e3))
     yield _effect(component, 'inertia', _share(-0.6, 2.0, f'{axis}.inertia_hub'))
-    for name, field, number, *range_and_step in (
+    for name, field, number, low, high, step in (
             ('mode_frequency', 'mode_frequencies', 'change', -0.5, 0.8, 3e-3),
             ('mode_damping', 'mode_damping_ratios', 'factor', -0.95, 30.0, 0.1)):
-        low, high, step = range_and_step
         fields = [f'{axis}.{field}.{j}' for j in range(3)]
         yield _effect(component, name, *(
             Form(f'mode {j}', (_share(low, high, path, name=f'{number}_{j}', step=step),))
@@ -248,3 +250,55 @@ def catalogue(encoder_digit: float = 0.0) -> dict[str, Effect]:
     found.append(_effect('loop', 'delay', Form('of the command', (delay,)),
                          Form('of the rate error', (later,))))
     return {effect.id: effect for effect in found}
+
+
+class AntennaCatalogue(Catalogue):
+    """
+    The effects of the antenna drive, and the orders of its waves.
+
+    What their parameters do is registered in `modifiers`, which grows as orders are chosen.
+    """
+
+    def __init__(self, effects: Iterable[Effect], modifiers: KnownModifiers) -> None:
+        super().__init__(effects)
+        self._modifiers = modifiers
+        modifiers.register(p for effect in self.values() for form in effect.forms
+                           for p in form.parameters)
+
+    def forms(self, effect: Effect, experiments: Sequence[Experiment],
+              residuals: Sequence[FloatArray]) -> Sequence[Form]:
+        """Return an effect's forms; those of a wave with its likeliest orders."""
+        form = effect.forms[0]
+        if isinstance(form, Wave):
+            return [self.wave_at(form, order) for order in likely_orders(
+                form, experiments, residuals, _ORDERS)]
+        return effect.forms
+
+    def typical_form(self, effect: Effect) -> Form:
+        """Return the first form of an effect; of a wave, one of a middle order."""
+        form = effect.forms[0]
+        if isinstance(form, Wave):
+            return self.wave_at(form, form.orders[min(11, len(form.orders) - 1)])
+        return form
+
+    def form_named(self, effect: Effect, name: str) -> Form:
+        """Return the form of an effect by its name; that of a wave says its order."""
+        form = effect.forms[0]
+        if isinstance(form, Wave):
+            return self.wave_at(form, form.order_of(name))
+        if name == DIGITS_SEEN:
+            return form  # a planned test has no readings to see digits in: it is rounded
+        return super().form_named(effect, name)
+
+    def counterpart(self, form: Form, effect: Effect, part: Effect) -> Form:
+        if not isinstance(form, Wave):
+            return part.forms[effect.forms.index(form)]
+        same = part.forms[0]
+        assert isinstance(same, Wave)
+        return self.wave_at(same, form.shape.order)
+
+    def wave_at(self, form: Wave, order: float) -> Wave:
+        """Return the form of a wave of one order, whose parameters then are known."""
+        chosen = form.at(order)
+        self._modifiers.register(chosen.parameters)
+        return chosen

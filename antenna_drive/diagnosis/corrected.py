@@ -101,7 +101,7 @@ def _written(drive: Drive, fitted: Sequence[tuple[AntennaParameter, float]],
     """Return the changed numbers by dotted name, the recorder's errors, and what has no place."""
     record = record_of(drive)
     kind = record.dtype
-    run = RunSetup(record.view(np.float64), kind, 0.0, Bias())
+    run = RunSetup(record.view(np.float64), kind, Bias())
     recorder: dict[tuple[str, str], list[float]] = {}
     missing = []
     for item, value in fitted:

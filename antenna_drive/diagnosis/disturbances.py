@@ -1,13 +1,16 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""The places of the drive where an unknown input may act."""
+"""The places of the drive where an unknown input may act, and how it gets into a run."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
 import math
 
-from antenna_drive.diagnosis.modifiers import ADD, SET
-from simgap.machine.contract import DisturbanceInput
+from antenna_drive.diagnosis.modifiers import ADD, RunSetup, SET
+from antenna_drive.emulator import batch
+from antenna_drive.parameters.records import place_of
+import numpy as np
+from simgap.machine.contract import Course, DisturbanceInput
 
 # One unit of a torque on the axis [N m].
 _AXIS = 3e4
@@ -46,3 +49,14 @@ def disturbances(wind: float) -> Iterator[DriveDisturbance]:
         yield DriveDisturbance(f'displacement in gearbox {m}', f'gearbox_{m}', tooth, 2e-3, (
             (tooth, ADD, 1e-12), (f'{tooth}_cycles', SET, 0.0),
             (f'{tooth}_phase', SET, 0.5 * math.pi)))
+
+
+def disturbed(plan: batch.Schedule, run: RunSetup, place: DriveDisturbance,
+              course: Course) -> batch.Schedule:
+    """Return a plan that lets an input into the drive, and set the drive's record up for it."""
+    for path, how, value in place.settings:
+        run.change(path, how, value)
+    steps = plan.steps.copy()
+    length = steps[:, batch.LENGTH]
+    steps[:, batch.CHANGE] = place.size * course(np.cumsum(length) - 0.5 * length)
+    return batch.Schedule(steps, plan.keep, place_of(run.kind, place.path))

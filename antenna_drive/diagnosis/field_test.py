@@ -1,20 +1,22 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""A recorded test, prepared for comparison: the command, the bias and the readings."""
+"""A recorded test, prepared for comparison: the command, the bias, the readings, the steps."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 import math
-from typing import Any
+from typing import Any, TypeAlias
 
-from antenna_drive.diagnosis.excitation import Bias, CommandedRate, Longest, schedule, SheetCommand
+from antenna_drive.diagnosis.excitation import (
+    Bias, CommandedRate, Longest, schedule, SheetCommand, with_bias,
+)
 from antenna_drive.diagnosis.field_recording import FieldRecording, Note
 from antenna_drive.diagnosis.inference import completed
 from antenna_drive.diagnosis.late_readings import dense, lagging, Outputs, parts_of, read_at
-from antenna_drive.diagnosis.modifiers import SensorReadings
+from antenna_drive.diagnosis.modifiers import RunSetup, SensorReadings
 from antenna_drive.diagnosis.recorded_command import RecordedCommand
 from antenna_drive.diagnosis.sensors import SensorModel, slips
 from antenna_drive.diagnosis.sheet_settings import as_the_sheet_says
@@ -42,6 +44,10 @@ _ANGLE_S = 0.1
 # What the command did in a hole of the recording is forgotten after this time, as far as the mean
 # in it does not tell [s].
 _FORGOTTEN_S = 2.0
+# Tables that are kept: a test has one for each bias voltage and each wave.
+_KEPT_PLANS = 24
+# What no sample of a command shows, see `RunSetup.unrecorded`.
+_Unrecorded: TypeAlias = tuple[tuple[tuple[str, int], float], ...]
 
 
 @dataclass(frozen=True)
@@ -128,6 +134,31 @@ class FieldTest:
         rate = self.command(np.linspace(self.time[0], self.time[-1], _LOOKS))
         early, late = (np.count_nonzero(np.diff(np.sign(part))) for part in np.split(rate, 2))
         return bool(max(early, late) <= _SWEEP * (min(early, late) + 1))
+
+
+class Plans:
+    """The tables of steps of some tests, which are kept while runs differ in numbers alone."""
+
+    def __init__(self, tests: Sequence[FieldTest]) -> None:
+        self._tests = tests
+        self._kept = lru_cache(_KEPT_PLANS)(self._made)
+
+    def steps(self, k: int, run: RunSetup, longest: Longest) -> batch.Schedule:
+        """Return the steps of a run of test k, none of which is longer than allowed."""
+        return self._kept(k, longest, run.delay, tuple(run.unrecorded.items()), run.bias)
+
+    def _made(self, k: int, longest: Longest, delay: float, unrecorded: _Unrecorded,
+              bias: Bias) -> batch.Schedule:
+        test = self._tests[k]
+        if bias != test.bias:
+            return with_bias(self._kept(k, longest, delay, unrecorded, test.bias), bias)
+        command = test.command
+        if isinstance(command, RecordedCommand):
+            # jumps move before means change
+            for (what, number), value in sorted(unrecorded, key=lambda item: item[0][0]):
+                change = command.with_jump if what == 'jump' else command.with_mean
+                command = change(number, value)
+        return schedule(command, bias, test.output_times, longest, delay)
 
 
 def prepared(recordings: Mapping[str, Recording], drive: Drive, note: Note) -> list[FieldTest]:

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 import copy
 from dataclasses import dataclass, replace
@@ -14,22 +14,19 @@ import math
 from threading import Lock
 from typing import Any
 
-from antenna_drive.diagnosis.advice import ADVICE
-from antenna_drive.diagnosis.antenna_catalogue import AntennaCatalogue
-from antenna_drive.diagnosis.catalogue import catalogue, EXTRA_MODE
+from antenna_drive.diagnosis.catalogue import AntennaCatalogue, catalogue, EXTRA_MODE
 from antenna_drive.diagnosis.diagram import DIAGRAM
-from antenna_drive.diagnosis.disturbances import disturbances, DriveDisturbance
+from antenna_drive.diagnosis.disturbances import disturbances, disturbed, DriveDisturbance
 from antenna_drive.diagnosis.excitation import Longest
-from antenna_drive.diagnosis.field_test import FieldTest, prepared
+from antenna_drive.diagnosis.field_test import FieldTest, Plans, prepared
 from antenna_drive.diagnosis.late_readings import Outputs, RipplingTachometer
 from antenna_drive.diagnosis.modifiers import KnownModifiers, RunSetup, SensorReadings
-from antenna_drive.diagnosis.plans import disturbed, Plans
 from antenna_drive.diagnosis.sensors import digit_of
 from antenna_drive.diagnosis.tolerances import (
     AntennaNuisances, everyday_wind_torque, nuisances, tolerated,
 )
 from antenna_drive.diagnosis.waves import fastest_wave, is_there
-from antenna_drive.diagnosis.words import words
+from antenna_drive.diagnosis.words import advice, words
 from antenna_drive.emulator import batch
 from antenna_drive.parameters.sets import Drive
 from antenna_drive.readings import AT, NAMED, READINGS, SIGNALS
@@ -40,7 +37,6 @@ from simgap.machine.contract import (
     Course, DisturbanceInput, Experiment, FloatArray, Machine, Motion, Point, TimeScales,
 )
 
-_TIME_SCALES = TimeScales(start_s=1.5, scan_s=8.0, pulse_s=0.15, response_s=1.5, block_s=1.0)
 LONGEST_STEP = 2.65e-3
 # A search looks at this much of a test [s]. It and derivatives take longer steps, whose error is
 # a tenth of the noise.
@@ -89,9 +85,9 @@ class AntennaMachine(Machine):
     """
 
     catalogue: AntennaCatalogue
-    time_scales = _TIME_SCALES
+    time_scales = TimeScales(
+        start_s=1.5, scan_s=8.0, pulse_s=0.15, response_s=1.5, block_s=1.0)
     diagram = DIAGRAM
-    advice = ADVICE
 
     def __init__(self, recordings: Mapping[str, Recording], drive: Drive,
                  threads: int = 2) -> None:
@@ -117,16 +113,15 @@ class AntennaMachine(Machine):
         self._digit = _coarser_digit(self._tests)
         tolerances = nuisances(self._tests, max(given, default=_TOLERANCE))
         effects = catalogue(self._digit)
+        self.advice = advice()
         self.words = words(effects.values(), drive, self._tests[0].record)
-        modifiers = KnownModifiers()
-        self._run_modifiers, self._reading_modifiers = modifiers.of_runs, modifiers.of_readings
-        super().__init__((), AntennaNuisances(tolerances, self._tests, modifiers),
+        self._modifiers = KnownModifiers()
+        super().__init__((), AntennaNuisances(tolerances, self._tests, self._modifiers),
                          AntennaCatalogue((tolerated(effect, tolerances)
-                                           for effect in effects.values()),
-                                          modifiers, self._digit > 0.0))
+                                           for effect in effects.values()), self._modifiers))
         self.disturbance_inputs = tuple(disturbances(everyday_wind_torque(self._tests[0])))
         self.experiments = self._experiments({})
-        self.planning = {'sheet': sheet_tree(_in_common(test.sheet for test in self._tests))}
+        self.planning = {'sheet': sheet_tree(_in_common([test.sheet for test in self._tests]))}
 
     @property
     def records(self) -> Sequence[np.ndarray[Any, np.dtype[Any]]]:
@@ -242,7 +237,7 @@ class AntennaMachine(Machine):
 
     def _job(self, k: int, point: Point, until: float) -> _Job:
         """Return the run of one test at a point: what acts on readings alone is not part of it."""
-        known = self._run_modifiers
+        known = self._modifiers.of_runs
         return _Job(k, tuple(sorted(item for item in point.items() if item[0] in known
                                     and known[item[0]][1] in (None, k))), until)
 
@@ -262,10 +257,10 @@ class AntennaMachine(Machine):
              channels: tuple[str, ...] = SIGNALS) -> Outputs:
         test = self._tests[job.experiment]
         kind = test.record.dtype
-        run = RunSetup(test.record.view(np.float64).copy(), kind, float(test.time[-1]), test.bias,
+        run = RunSetup(test.record.view(np.float64).copy(), kind, test.bias,
                        start_angle=test.start_angle)
         for name, value in job.items:
-            self._run_modifiers[name][0].apply(run, value)
+            self._modifiers.of_runs[name][0].apply(run, value)
         record = run.numbers.view(kind)
         run.write_waves()
         cycles = fastest_wave(test.record)
@@ -288,13 +283,10 @@ class AntennaMachine(Machine):
         wanted = (*channels, *(f'{motor}/angle' for motor in rippling.values()))
         time = test.output_times
         samples = int(np.count_nonzero(time - time[0] < job.until))
-        if samples == time.size:
-            out = batch.run(record, plan, channels=wanted)
-        else:
-            steps = int(np.argmax(plan.keep == samples - 1))
-            out = np.full((time.size, len(wanted), 2), np.nan)
-            out[:samples] = batch.run(record, batch.Schedule(
-                plan.steps[:steps], plan.keep[:steps + 1]), channels=wanted)
+        steps = int(np.argmax(plan.keep == samples - 1))
+        out = np.full((time.size, len(wanted), 2), np.nan)
+        out[:samples] = batch.run(record, replace(
+            plan, steps=plan.steps[:steps], keep=plan.keep[:steps + 1]), channels=wanted)
         return Outputs(out[:, :len(channels)], {
             name: RipplingTachometer(out[:, row, 0], record[motor]['tachometer'])
             for row, (name, motor) in enumerate(rippling.items(), len(channels))})
@@ -303,7 +295,7 @@ class AntennaMachine(Machine):
         """Return the readings of a run, with the errors of sensors that nothing feeds back."""
         errors = SensorReadings()
         for name, value in point.items():
-            modifier, test = self._reading_modifiers.get(name, (None, None))
+            modifier, test = self._modifiers.of_readings.get(name, (None, None))
             if modifier is not None and test in (None, k) and value:
                 modifier.apply_to_readings(errors, value)
         digits = self.experiments[k].measured[:, AT['encoder']] if self._digit else None
@@ -317,9 +309,8 @@ def _coarser_digit(tests: Sequence[FieldTest]) -> float:
     return digit if digit > _COARSER * known else 0.0
 
 
-def _in_common(sheets: Iterable[TestSheet]) -> TestSheet:
+def _in_common(sheets: Sequence[TestSheet]) -> TestSheet:
     """Return what a further test of the machine shares with those that were made."""
-    first, *others = sheets
-    bias = next((sheet.bias for sheet in (first, *others)
-                 if isinstance(sheet.bias, CircuitBias)), first.bias)
-    return replace(first, waveform=None, bias=bias, start='rest')
+    bias = next((sheet.bias for sheet in sheets if isinstance(sheet.bias, CircuitBias)),
+                sheets[0].bias)
+    return replace(sheets[0], waveform=None, bias=bias, start='rest')

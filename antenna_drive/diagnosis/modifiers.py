@@ -70,12 +70,10 @@ class RunSetup:
 
     numbers: FloatArray  # the drive's record as plain ones: numpy copies a record by field
     kind: np.dtype[Any]  # of the record
-    duration_s: float  # of the test
     bias: Bias  # source of the bias voltage, where the share circuit is not connected
-    # by number: how much later jumps of the command come [s], how much higher the mean of the
-    # command is in its holes [rad/s]
-    late_jumps: dict[int, float] = field(default_factory=dict)
-    hole_means: dict[int, float] = field(default_factory=dict)
+    # by what and number: how much later a 'jump' of the command comes [s], how much higher its
+    # 'mean' is in a hole [rad/s]
+    unrecorded: dict[tuple[str, int], float] = field(default_factory=dict)
     waves: dict[WaveShape, list[float]] = field(default_factory=dict)  # parts of each
     start_angle: float = 0.0  # of the axis at the beginning [rad]; waves go on from there
 
@@ -196,11 +194,11 @@ class RecorderError(ReadingModifier):
 class Unrecorded(RunModifier):
     """What no sample of a recorded command shows, such as when it jumped between two."""
 
-    what: str  # `late_jumps` or `hole_means` of a `RunSetup`
+    what: str  # see `RunSetup.unrecorded`
     number: int
 
     def apply(self, run: RunSetup, value: float) -> None:
-        getattr(run, self.what)[self.number] = value
+        run.unrecorded[self.what, self.number] = value
 
 
 @dataclass(frozen=True)

@@ -57,12 +57,7 @@ _STARTS = np.linspace(-0.95, 0.95, 13)
 
 
 def nuisances(tests: Sequence[FieldTest], tolerance: float) -> tuple[AntennaParameter, ...]:
-    """
-    Return the nuisances of a machine in its tests.
-
-    tests : that were made
-    tolerance : by what share the machine's numbers may differ from the configuration
-    """
+    """Return the nuisances of a machine in its tests, whose numbers may be off by this share."""
     return (*_of_the_machine(tests[0], tolerance), *_of_zeros_and_recorders(tests),
             *(item for k, test in enumerate(tests) for item in _of_a_test(k, test, tolerance)))
 
@@ -161,12 +156,12 @@ def _of_a_test(k: int, test: FieldTest, tolerance: float) -> Iterator[AntennaPar
             name = f'jump:{test.name}:{begin:.3f}'
             earlier, later = command.slack[i].tolist()
             half = 0.5 * (later - earlier)
-            yield replace(_within(name, 's', half, Unrecorded('late_jumps', i), k), low=earlier,
+            yield replace(_within(name, 's', half, Unrecorded('jump', i), k), low=earlier,
                           high=later)
 
         for i, (begin, _) in enumerate(command.holes):
             yield _within(f'hole:{test.name}:{begin:.3f}', 'rad/s',
-                          2.0 * float(command.uncertainty[i]), Unrecorded('hole_means', i), k)
+                          2.0 * float(command.uncertainty[i]), Unrecorded('mean', i), k)
 
     given = _allowed([test])
     if given.clock_ppm:
@@ -235,9 +230,8 @@ def tolerated(effect: Effect, tolerances: Sequence[AntennaParameter]) -> Effect:
 
     def known(item: Parameter) -> Parameter:
         assert isinstance(item, AntennaParameter)
-        modifier: Modifier = item.modifier
-        same_number = min(
-            (allowed.get((path, modifier.how), 0.0) for path in modifier.fields), default=0.0)
+        same_number = min((allowed.get((path, item.modifier.how), 0.0)
+                           for path in item.modifier.fields), default=0.0)
         return replace(item, tolerance=max(item.tolerance, same_number))
 
     return replace(effect, forms=tuple(

@@ -4,14 +4,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 from antenna_drive.diagnosis.modifiers import (
     AntennaParameter, HARMONICS, ReadingModifier, RunModifier, RunSetup, SensorReadings, WaveShape,
 )
+from antenna_drive.readings import AT
 import numpy as np
-from simgap.machine.contract import Form
+from scipy.ndimage import median_filter
+from simgap.machine.contract import Experiment, FloatArray, Form
 
 _PARTS = ('sine', 'cosine', 'cycles_change', 'second_sine', 'second_cosine', 'third_sine',
           'third_cosine')
@@ -19,6 +22,10 @@ _CYCLES = ' cycles per revolution'
 # The waves of the drive that follow a motor's angle: unit, part and name.
 _OF_MOTORS = tuple((motor, part, stem) for motor in ('motor_1', 'motor_2') for part, stem in (
     ('motor', 'torque_ripple'), ('gearbox', 'transmission_error'), ('tachometer', 'ripple')))
+# Time within which the integral of a tachometer does not drift [s].
+_WINDOW_S = 1.5
+# Number of orders about one that say what is usual there.
+_NEIGHBOURS = 9
 
 
 def is_there(numbers: np.ndarray[Any, np.dtype[Any]], stem: str) -> bool:
@@ -106,3 +113,66 @@ def wave(unit: str, limit: float, step: float, shape: WaveShape, orders: tuple[f
 
     return Wave('', tuple(part(*item) for item in enumerate(_PARTS)), is_wave=True,
                 shape=shape, orders=orders)
+
+
+def likely_orders(form: Wave, experiments: Sequence[Experiment],
+                  residuals: Sequence[FloatArray], count: int) -> list[float]:
+    """
+    Return so many orders that stand out most in residuals, shape (n, c) for each test.
+
+    The first stands out most from its neighbours, which a misfit without a period does not do.
+    The second holds most of the energy. The others follow in turn.
+    """
+    orders = np.array(form.orders)
+    energy = np.zeros(orders.size)
+    peak = np.zeros(orders.size)
+    for experiment, residual in zip(experiments, residuals, strict=True):
+        scores = _scores(form, experiment, residual, orders)
+        usual = median_filter(scores, _NEIGHBOURS, mode='nearest') + 1e-9
+        energy += scores
+        # a score is a sum of squares, whose scatter is its square root
+        peak += np.maximum(scores - usual, 0.0) / np.sqrt(usual * max(1.0, float(usual.mean())))
+    found: list[float] = []
+    ranks = [list(np.argsort(by)[::-1]) for by in (peak, energy)]
+    while len(found) < count and any(ranks):
+        rank = ranks[len(found) % 2] or ranks[0]
+        order = float(orders[rank.pop(0)])
+        near = form.shape.angle == 'axis' and any(abs(np.log(order / f)) < 0.15 for f in found)
+        if order not in found and not near:
+            found.append(order)
+    return found
+
+
+def _scores(form: Wave, experiment: Experiment, residual: FloatArray,
+            orders: FloatArray) -> FloatArray:
+    """Return the power of a residual at each order, shape (m,)."""
+    clean = np.nan_to_num(residual / experiment.noise)
+    time = experiment.time
+    score = np.zeros(orders.size)
+    if form.shape.angle == 'axis':
+        angle = np.nan_to_num(experiment.measured[:, AT['encoder']])
+        if form.shape.stem == 'cyclic_error':
+            return _power(clean[:, AT['encoder']], angle, orders)
+        rate = np.gradient(angle, time)
+        moving = np.abs(rate) > 0.1 * np.abs(rate).max()
+        load = clean[:, AT['current_1']] + clean[:, AT['current_2']]
+        return _power(load * np.sign(rate) * moving, angle, orders)
+    windows = (time / _WINDOW_S).astype(int)
+    for path in form.shape.paths:
+        m = path.partition('.')[0][-1]
+        rate = np.nan_to_num(experiment.measured[:, AT[f'tach_{m}']])
+        angle = np.r_[0.0, np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(time))]
+        for channel in (AT[f'current_{m}'], AT[f'tach_{m}']):
+            for w in range(windows[-1] + 1):
+                inside = windows == w
+                if np.count_nonzero(inside) >= 10:
+                    score += _power(clean[inside, channel], angle[inside], orders)
+    return score
+
+
+def _power(signal: FloatArray, angle: FloatArray, orders: FloatArray) -> FloatArray:
+    """Return the power of a signal in waves of an angle, without their means, shape (m,)."""
+    wave = np.exp(-1j * np.outer(orders, angle))
+    wave -= wave.mean(axis=1, keepdims=True)
+    power = np.sum(np.abs(wave) ** 2, axis=1) + 1e-3
+    return np.asarray(np.abs(wave @ (signal - signal.mean())) ** 2 / power)

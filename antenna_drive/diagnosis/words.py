@@ -41,6 +41,11 @@ def row_of(component: str, effect: str, number: str = '') -> dict[str, str]:
     return rows.get(f'{kind}.{effect}.{number}') or rows[f'{kind}.{effect}']
 
 
+def advice() -> tuple[tuple[tuple[str, ...], str], ...]:
+    """Return which tests settle which effects, see `Machine.advice`."""
+    return tuple((tuple(row['effects']), row['test']) for row in _table()['advice'])
+
+
 def ratio(change: float, word: str = ' percent') -> str:
     """Return by how much a number differs, without its sign: 40 percent, 930 times."""
     size = abs(change)

@@ -6,9 +6,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from antenna_drive.diagnosis.field_test import Plans
 from antenna_drive.diagnosis.late_readings import dense, lagging, parts_of, read_at
 from antenna_drive.diagnosis.machine import AntennaMachine, LOW_FIDELITY_STEP
-from antenna_drive.diagnosis.plans import Plans
 from antenna_drive.diagnosis.prediction import predict, recorder_errors
 from antenna_drive.diagnosis.recorded_command import RecordedCommand
 from antenna_drive.parameters import load

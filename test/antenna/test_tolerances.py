@@ -55,8 +55,8 @@ def test_a_tolerance_changes_its_number_and_no_other(name: str, path: str,
             number = getattr(number, part)
         assert isinstance(number, float)
         value *= number
-    setup = RunSetup(record_of(drive).view(np.float64).copy(), record_of(drive).dtype, 2.0,
-                     TESTS[0].bias)
+    record = record_of(drive)
+    setup = RunSetup(record.view(np.float64), record.dtype, TESTS[0].bias)
     assert isinstance(item.modifier, FieldChange)
     item.modifier.apply(setup, item.high)
     written = record_of(changed(drive, {path: value})).view(np.float64)

@@ -4,9 +4,8 @@
 
 from __future__ import annotations
 
-from antenna_drive.diagnosis.antenna_catalogue import likely_orders
 from antenna_drive.diagnosis.catalogue import catalogue
-from antenna_drive.diagnosis.waves import Wave
+from antenna_drive.diagnosis.waves import likely_orders, Wave
 from antenna_drive.physics.harmonics import wave
 from antenna_drive.readings import AT, READINGS, SIGNALS
 from hypothesis import given, settings

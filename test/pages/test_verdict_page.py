@@ -10,9 +10,9 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-from antenna_drive.diagnosis.advice import ADVICE
 from antenna_drive.diagnosis.catalogue import catalogue
 from antenna_drive.diagnosis.diagram import DIAGRAM
+from antenna_drive.diagnosis.words import advice
 from antenna_drive.pages import render
 from chromium import EXECUTABLE, Page
 import numpy as np
@@ -398,7 +398,7 @@ def test_the_drives_picture_and_advice_are_of_its_catalogue() -> None:
     for effect in effects:
         assert set(DIAGRAM.several.get(effect.component, (effect.component,))) <= shown, effect.id
     kinds = {effect.id.partition('.')[2] for effect in effects}
-    assert {name for names, _ in ADVICE for name in names} <= kinds
+    assert {name for names, _ in advice() for name in names} <= kinds
 
 
 @needs_browser
