@@ -3,6 +3,7 @@
 """How a machine answers an input of any course over time: the sum of its answers to pulses."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -46,6 +47,12 @@ def process(machine: Machine, point: Point) -> list[FloatArray | None]:
                 into.append(columns @ root(columns.shape[-1], changes))
     return [np.concatenate(parts, axis=-1).astype(np.float32) if parts else None
             for parts in found]
+
+
+def with_process(machine: Machine) -> Machine:
+    """Return a machine in planned tests, in which what acts every day acts as well."""
+    return machine.with_experiments([replace(e, process=part) for e, part in zip(
+        machine.experiments, process(machine, {}), strict=True)])
 
 
 def root(count: int, pulses: float) -> FloatArray:

@@ -12,6 +12,7 @@ from simgap.fit.least_squares import LeastSquares
 from simgap.fit.noise import with_model_error
 from simgap.fit.state import proper_precision
 from simgap.machine.contract import FloatArray, Machine, Parameter, Point
+from simgap.machine.pulses import with_process
 from simgap.next_test.rivals import known_to, numbers_of
 from simgap.next_test.separation import LEAST, prior_of, Separation
 from simgap.search.rival import Rival
@@ -28,7 +29,7 @@ def separation(machine: Machine, rivals: Sequence[Rival], inflated: float,
     catalogue lacks an effect or a form.
     """
     points = [known_to(machine, rival) for rival in rivals]
-    problem = planned(machine, rivals, points)
+    problem = planned(with_process(machine) if follow else machine, rivals, points)
     residuals = np.array([problem.residuals(point) for point in points])
     prior, lack = prior_of(rivals), np.zeros((len(rivals), len(rivals)))
     channels = problem.experiments[0].channels
@@ -49,7 +50,7 @@ def deviations(machine: Machine, rival: Rival, inflated: float,
                ) -> tuple[tuple[str, ...], FloatArray, FloatArray]:
     """Return a rival's m names, and their covariances before and after tests, shape (m, m)."""
     point = known_to(machine, rival)
-    problem = planned(machine, [rival], [point])
+    problem = planned(with_process(machine), [rival], [point])
     numbers = numbers_of(machine, rival)
     jacobian = problem.jacobian(point, numbers, problem.residuals(point), central=False)
     known = (jacobian.T @ jacobian).astype(float) + _precision(rival, numbers, inflated)

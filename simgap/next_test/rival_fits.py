@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 from simgap.fit.least_squares import LeastSquares
 from simgap.machine.contract import FloatArray, Machine, Parameter, Point
+from simgap.machine.pulses import with_process
 from simgap.next_test.discrimination import planned
 from simgap.next_test.rivals import known_to, numbers_of
 from simgap.next_test.separation import prior_of, Separation
@@ -30,7 +31,7 @@ def confirmed_separation(machine: Machine, rivals: Sequence[Rival],
     `separation`.
     """
     points = [known_to(machine, rival) for rival in rivals]
-    problem = planned(machine, rivals, points)
+    problem = planned(with_process(machine), rivals, points)
     readings = machine.simulate(points)
     left = np.zeros((len(rivals), len(rivals)))
     ends: dict[tuple[int, int], Point] = {}
