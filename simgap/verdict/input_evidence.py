@@ -41,19 +41,17 @@ class InputEvidence:
                                          or np.ones(len(e.channels)), e.time.size)
                                  for e in problem.experiments])
         loud = min(1.0, float(np.mean((stated * residual)[problem.valid] ** 2)))
-        found = cls(residual, loud, weight, jacobian, prior_precision(nuisances))
         # what acts every day is known to a share only, as the form of an effect is
         bare = LeastSquares(problem.machine.with_experiments(
             [replace(e, process=None) for e in problem.experiments]), settings=problem.settings)
         taken = 0.5 * float(weight @ (bare.residuals(here) ** 2 - residual ** 2))
-        found.process_error = problem.settings.evidence.form_error ** 2 * max(taken, 0.0)
-        return found
+        return cls(residual, loud, weight, jacobian, prior_precision(nuisances),
+                   problem.settings.evidence.form_error ** 2 * max(taken, 0.0))
 
     def __init__(self, residual: FloatArray, loud: float, weight: FloatArray,
-                 nuisances: FloatArray, prior: FloatArray) -> None:
+                 nuisances: FloatArray, prior: FloatArray, process_error: float = 0.0) -> None:
         self.residual, self._weight = residual, weight
-        self._loud = loud
-        self.process_error = 0.0  # price of the form of what acts every day [half chi-square]
+        self._loud, self.process_error = loud, process_error
         weighted = nuisances * weight[:, np.newaxis]
         square = nuisances.T @ weighted + np.diag(prior)
         self._inverse = np.linalg.pinv(square, hermitian=True)

@@ -39,8 +39,7 @@ def quantities_of(problem: LeastSquares, point: Mapping[str, float]) -> Quantiti
     """Return what the machine does, by name: values at the samples of each test."""
     found: dict[str, list[FloatArray]] = {}
     for k, experiment in enumerate(problem.experiments):
-        readings = problem.machine.predict(point, k)
-        own = dict(zip(experiment.channels, readings.T, strict=True))
+        own = dict(zip(experiment.channels, problem.machine.predict(point, k).T, strict=True))
         for name, values in {**problem.machine.motion(k).covariates(), **own}.items():
             found.setdefault(name, []).append(np.asarray(values))
     return {name: values for name, values in found.items()
@@ -58,14 +57,12 @@ def likeliest(evidence: InputEvidence, square: FloatArray, slope: FloatArray,
         for by, values in quantities.items():
             if by == times:
                 continue
-            at, hats = _hats(np.concatenate(values))
-            columns = weight * hats
-            reached = np.abs(columns).max(axis=0)
+            at, columns = _hats(np.concatenate(values))
+            reached = np.abs(weight * columns).max(axis=0)
             kept = reached > _REACHED * reached.max()
-            columns = columns[:, kept]
+            columns = (weight * columns)[:, kept]
             own = columns.T @ square @ columns
-            size = float(np.trace(own)) / max(len(own), 1)
-            if size <= 0.0:
+            if (size := float(np.trace(own)) / max(len(own), 1)) <= 0.0:
                 continue
             found, _, heights = evidence.weighed(own, columns.T @ slope, size)
             found -= evidence.process_error

@@ -3,6 +3,7 @@
 """Where a gap lies: parts (of the effects, or of an unknown input), signals and regimes."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -34,7 +35,12 @@ def of_effects(problem: LeastSquares, answers: Sequence[Answer], none: FitState,
 def of_the_unknown(problem: LeastSquares, none: FitState,
                    parts: Mapping[str, float]) -> list[Located]:
     """Return where something lies that no effect names, given how likely each part is."""
-    found = _located(problem, parts, lambda k: problem.residuals_of(none, k) ** 2 - 1.0)
+    # what slow noise could pass for is judged as it was read
+    read = LeastSquares(problem.machine.with_experiments(
+        [replace(e, colours=()) for e in problem.experiments]), settings=problem.settings)
+    gaps = np.where(read.valid, read.residuals(none.point()), 1.0)
+    found = _located(problem, parts, lambda k: gaps[read.rows(k)].reshape(
+        problem.experiments[k].measured.shape) ** 2 - 1.0)
     acts = {signal: list(_acts(problem, none, signal))
             for signal in dict.fromkeys(item['signal'] for item in found)}
     return [{**item, 'acts': acts[item['signal']]} for item in found]

@@ -161,10 +161,12 @@ def _unknown(verdict: Verdict) -> str:
         what += (f', most likely in {first["component"]}; it shows most in {first["signal"]} '
                  f'({first["regime"]})')
     lines = [f'{what}.']
+    # the greatest in its noise, as it was read: a filter would take slow steps for noise
+    noises = {name: item.get('noise') for name, item in verdict.remains.items()}
     sizes = {name: item for name, item in verdict.how_far['per_signal'].items()
-             if item.get('before') is not None and item.get('before_in_unit') is not None}
+             if item.get('before_in_unit') is not None and noises.get(name)}
     if sizes:
-        name = max(sizes, key=lambda key: float(sizes[key]['before']))
+        name = max(sizes, key=lambda key: float(sizes[key]['before_in_unit'] / noises[key]))
         lines.append(f'The model misses {name} by '
                      f'{quantity(sizes[name]["before_in_unit"], sizes[name]["unit"])} rms.')
     if verdict.may_enter_at:

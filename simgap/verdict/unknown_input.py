@@ -52,9 +52,7 @@ def places(problem: LeastSquares, point: Mapping[str, float]) -> list[Place]:
     for place in problem.machine.disturbance_inputs:
         judged(place.name, place.component, *_columns(problem, point, place), _SMOOTH)
     for c, channel in enumerate(channels):
-        pulses = [_of_reading(problem, k, c) for k in range(len(problem.experiments))]
-        judged(f'reading of {channel}', channel, [columns for columns, _ in pulses],
-               [moments for _, moments in pulses], (0.0,))
+        judged(f'reading of {channel}', channel, *_of_reading(problem, c), (0.0,))
     # what repeats itself too fast for a pulse, such as a hum, lies in its reading
     most = 2.0 * max(share for share, _ in found)
     for c, channel in enumerate(channels):
@@ -70,13 +68,9 @@ def courses(problem: LeastSquares, point: Mapping[str, float],
     """Return what would have to enter at a place, by test: times [s] and values, (m,) each."""
     evidence = InputEvidence.at(problem, point)
     responses, times = _columns(problem, point, place)
-    _, _, heights = evidence.of_course(*evidence.reduced(responses),
-                                       [moments.size for moments in times], _SMOOTH)
-    found, first = [], 0
-    for moments in times:
-        found.append((moments, heights[first:first + moments.size]))
-        first += moments.size
-    return found
+    counts = [moments.size for moments in times]
+    _, _, heights = evidence.of_course(*evidence.reduced(responses), counts, _SMOOTH)
+    return list(zip(times, np.split(heights, np.cumsum(counts)[:-1]), strict=True))
 
 
 def _columns(problem: LeastSquares, point: Mapping[str, float],
@@ -99,14 +93,18 @@ def components(found: Sequence[Place], caution: float) -> dict[str, float]:
     return {name: value / total for name, value in weight.items()}
 
 
-def _of_reading(problem: LeastSquares, k: int, channel: int) -> tuple[FloatArray, FloatArray]:
-    """Return pulses of a reading itself, shape (n c, pulses), and when they have their peaks."""
-    experiment, scales = problem.experiments[k], problem.machine.time_scales
-    # the cost grows with the third power of their number
-    first, last = float(experiment.time[0]), float(experiment.time[-1])
-    rise = max(scales.pulse_s, (last - first) / _MOST_PULSES)
-    starts = np.arange(first, last - 2.0 * rise, rise)
-    pulses = np.zeros((*experiment.measured.shape, starts.size))
-    pulses[:, channel] = experiment.noise[:, channel, np.newaxis] * np.maximum(
-        0.0, 1.0 - np.abs(experiment.time[:, np.newaxis] - starts - rise) / rise)
-    return problem.whitened(k, pulses), starts + rise
+def _of_reading(problem: LeastSquares,
+                channel: int) -> tuple[list[FloatArray], list[FloatArray]]:
+    """Return pulses of a reading itself, and their peaks, as `_columns` does."""
+    responses, peaks = [], []
+    for k, experiment in enumerate(problem.experiments):
+        # the cost grows with the third power of their number
+        time, last = experiment.time, float(experiment.time[-1])
+        rise = max(problem.machine.time_scales.pulse_s, (last - float(time[0])) / _MOST_PULSES)
+        moments = np.arange(float(time[0]), last - 2.0 * rise, rise) + rise
+        pulses = np.zeros((*experiment.measured.shape, moments.size))
+        pulses[:, channel] = experiment.noise[:, channel, np.newaxis] * np.maximum(
+            0.0, 1.0 - np.abs(time[:, np.newaxis] - moments) / rise)
+        responses.append(problem.whitened(k, pulses))
+        peaks.append(moments)
+    return responses, peaks

@@ -59,6 +59,6 @@ def test_noise_has_no_law() -> None:
 
 def test_a_law_that_noise_could_pass_for_is_no_noise() -> None:
     """A few steps of three deviations are slow noise to a filter, and follow the direction."""
-    steps = 0.15 * np.sign(RATE)
-    assert diagnose(Turning(steps, NOTHING)).word == 'unknown_effect'
+    found = diagnose(Turning(0.15 * np.sign(RATE), NOTHING))
+    assert (found.word, found.where[0]['signal']) == ('unknown_effect', 'seen left')
     assert diagnose(Turning(NOTHING, NOTHING)).word == 'no_gap'
