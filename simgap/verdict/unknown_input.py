@@ -45,8 +45,7 @@ def places(problem: LeastSquares, point: Mapping[str, float]) -> list[Place]:
             quantity: [np.interp(moments, e.time, own) for moments, e, own in zip(
                 peaks, problem.experiments, values, strict=True)]
             for quantity, values in quantities.items()})
-        if law:
-            weighed = max(weighed, law.evidence)
+        weighed = max(weighed, law.evidence if law else 0.0)
         found.append((share, Place(name, component, weighed, evidence.net(weighed), law)))
 
     for place in problem.machine.disturbance_inputs:
