@@ -191,7 +191,9 @@ def test_the_place_that_explains_most_tells_of_the_unknown() -> None:
     (0.0, 'explained'), (SETTINGS.left, 'partly_explained'), (0.9, 'unknown_effect')])
 def test_the_word_of_a_verdict_follows_from_the_unknown(explained: float, word: str) -> None:
     searched = found(fitted(20000.0), fitted(1000.0, 'axis.inertia'))
-    decision = decide(searched, [place(explained)], True)
+    # it is a share of the whole gap, and places say theirs of what is left
+    left = 0.5 * searched.evidence.samples / searched.evidence.whole
+    decision = decide(searched, [place(explained / left)], True)
     assert decision.word == word
     named = statements(decision)['named']
     assert named['effects'] == (['unknown'] if word == 'unknown_effect' else ['axis.inertia'])

@@ -20,7 +20,9 @@ import pytest
 from simgap.machine.contract import Effect, Excerpt, Experiment, Form, Parameter
 from simgap.machine.diagram import Diagram, DiagramBlock
 from simgap.report.page import contents
+from simgap.verdict.law import Law
 from simgap.verdict.record import Named, Verdict
+from simgap.verdict.unknown_input import Place
 
 needs_browser = pytest.mark.skipif(EXECUTABLE is None, reason='there is no Chromium '
                                                               '(apt-get install chromium)')
@@ -52,7 +54,7 @@ FULL: dict[str, Any] = {
                     'after_in_unit': None}}},
     'where': [{'component': HOSTILE, 'signal': 'dial', 'regime': 'reversal', 'share': 0.4}],
     'may_enter_at': [{'name': HOSTILE, 'component': 'dial', 'explained': 0.3,
-                      'law': {'by': HOSTILE, 'times': HOSTILE}}],
+                      'law': {'by': 'rate', 'times': HOSTILE}}],
     'residual_tests': {
         'signals': {HOSTILE: {'rms': 1.0, 'slow_excess': 0.1, 'greatest_correlation': 0.2}}},
     'notes': [HOSTILE], 'seconds': 3.0,
@@ -85,7 +87,10 @@ def diagnosis(result: dict[str, Any], read: Sequence[int] = (1,), **machine: Any
     return Verdict(**{
         **{key: value for key, value in entries.items() if key != 'verdict'},
         'word': result['verdict'], 'which': [Named(**answer) for answer in result['which']],
-        'may_enter_at': [SimpleNamespace(**place) for place in result['may_enter_at']],
+        'may_enter_at': [
+            Place(place['name'], place['component'], 1.0, place['explained'],
+                  Law(evidence=1.0, at=(0.0,), values=(0.0,), **place['law']))
+            for place in result['may_enter_at']],
         'machine': model, 'none': fit, 'best': fit})
 
 
@@ -121,7 +126,8 @@ def test_everything_is_said_and_nothing_is_taken_for_html(browser: Page, tmp_pat
                   f'How much {HOSTILE} explains cannot be judged: {HOSTILE}.',
                   f'dial.gain + {HOSTILE}',
                   'cannot tell apart: motors.friction, dial.gain', 'reversal 40 %',
-                  f'{HOSTILE} dial 30 %', f'{HOSTILE} depends on rate (20 % of its residual)',
+                  f'{HOSTILE} dial 30 %',
+                  f'{HOSTILE}, best as a function of rate, in proportion to {HOSTILE}',
                   'Turn it by hand.', '3 s of computing', 'a bent needle',
                   f'data that was not fitted: {HOSTILE}.', 'matters',
                   'could be and still hide here', 'dial 12 samples: too few to judge',
