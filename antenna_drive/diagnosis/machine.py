@@ -283,10 +283,13 @@ class AntennaMachine(Machine):
         wanted = (*channels, *(f'{motor}/angle' for motor in rippling.values()))
         time = test.output_times
         samples = int(np.count_nonzero(time - time[0] < job.until))
-        steps = int(np.argmax(plan.keep == samples - 1))
-        out = np.full((time.size, len(wanted), 2), np.nan)
-        out[:samples] = batch.run(record, replace(
-            plan, steps=plan.steps[:steps], keep=plan.keep[:steps + 1]), channels=wanted)
+        if samples == time.size:
+            out = batch.run(record, plan, channels=wanted)
+        else:
+            steps = int(np.argmax(plan.keep == samples - 1))
+            out = np.full((time.size, len(wanted), 2), np.nan)
+            out[:samples] = batch.run(record, replace(
+                plan, steps=plan.steps[:steps], keep=plan.keep[:steps + 1]), channels=wanted)
         return Outputs(out[:, :len(channels)], {
             name: RipplingTachometer(out[:, row, 0], record[motor]['tachometer'])
             for row, (name, motor) in enumerate(rippling.items(), len(channels))})

@@ -16,8 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from simgap.machine.contract import Experiment, FloatArray
 
-# Directions in which the process moves readings by less than this share of their noise do not
-# matter.
+# Directions in which the process moves readings by a smaller share of their noise do not count.
 _LEAST = 0.1
 
 

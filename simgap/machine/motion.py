@@ -80,7 +80,7 @@ class Motion:
         return Regimes(_NAMES, labels)
 
     def covariates(self) -> Mapping[str, FloatArray]:
-        """Return quantities that a residual may depend on, shape (n,) each."""
+        """Return what an input may be a function of, shape (n,) each."""
         if self.rate is None:
             return {'time': self.time}
         found = {'rate': self.rate, 'direction': np.sign(self.rate) * _moving(self.rate),

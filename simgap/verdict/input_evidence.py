@@ -42,9 +42,11 @@ class InputEvidence:
                                  for e in problem.experiments])
         loud = min(1.0, float(np.mean((stated * residual)[problem.valid] ** 2)))
         # what acts every day is known to a share only, as the form of an effect is
+        acts = any(e.process is not None for e in problem.experiments)
         bare = LeastSquares(problem.machine.with_experiments(
-            [replace(e, process=None) for e in problem.experiments]), settings=problem.settings)
-        taken = 0.5 * float(weight @ (bare.residuals(here) ** 2 - residual ** 2))
+            [replace(e, process=None) for e in problem.experiments]),
+            settings=problem.settings).residuals(here) if acts else residual
+        taken = 0.5 * float(weight @ (bare ** 2 - residual ** 2))
         return cls(residual, loud, weight, jacobian, prior_precision(nuisances),
                    problem.settings.evidence.form_error ** 2 * max(taken, 0.0))
 
@@ -55,8 +57,7 @@ class InputEvidence:
         weighted = nuisances * weight[:, np.newaxis]
         square = nuisances.T @ weighted + np.diag(prior)
         self._inverse = np.linalg.pinv(square, hermitian=True)
-        self._slope = weighted.T @ residual
-        self._weighted = weighted
+        self._slope, self._weighted = weighted.T @ residual, weighted
         self._energy = float(residual @ (weight * residual)
                              - self._slope @ self._inverse @ self._slope)
         self._count = float(np.count_nonzero(weight))

@@ -77,8 +77,8 @@ def unknown_probability(found: Found, places: Sequence[Place]) -> float:
     """Return the probability that something outside the catalogue is at work."""
     settings = found.problem.settings.verdict
     # of the whole gap, because the form of a named effect errs in proportion to what it does
-    left, whole = 0.5 * found.evidence.samples, found.evidence.whole
-    explained = max((place.explained for place in places), default=0.0) * left / whole
+    explained = max((place.explained for place in places), default=0.0) * (
+        0.5 * found.evidence.samples / found.evidence.whole)
     beyond = math.log(max(explained, 1e-9) / settings.left) / settings.left_width
     share = 0.5 * (1.0 + math.tanh(0.5 * max(beyond, beyond_price(found, places))))
     return settings.least_unknown + (settings.most_unknown - settings.least_unknown) * share
