@@ -5,10 +5,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 from simgap.fit.broyden import Jacobian
 from simgap.fit.levenberg_marquardt import LevenbergMarquardt
 from simgap.fit.noise import innovations, whitened
@@ -68,6 +70,9 @@ class LeastSquares:
         """Return an experiment's residuals in standard deviations, shape (n c,); 0 for none."""
         if predicted is None:
             return np.zeros(self.sizes[k])
+        return self._without_process(k, self._of_sensors(k, predicted))
+
+    def _of_sensors(self, k: int, predicted: FloatArray) -> FloatArray:
         experiment, bound = self.experiments[k], self.settings.fit.runaway
         z = (experiment.measured - predicted) / (self.scale * experiment.noise)
         for c, colour in enumerate(experiment.colours):
@@ -77,28 +82,37 @@ class LeastSquares:
         # a prediction that diverged is a bad one, not an error
         if not np.isfinite(z).all():
             z = np.nan_to_num(z, nan=bound, posinf=bound, neginf=-bound)
-        return self._without_process(k, np.clip(z, -bound, bound, out=z))
+        return np.clip(z, -bound, bound, out=z)
 
     def whitened(self, k: int, changes: FloatArray) -> FloatArray:
         """Return changes of readings, shape (n, c, m), as residuals have them, shape (n c, m)."""
-        return self._without_process(k, self._scaled(k, changes) / self.scale)
-
-    def _scaled(self, k: int, changes: FloatArray) -> FloatArray:
-        experiment, bound = self.experiments[k], self.settings.fit.runaway
-        z = changes / experiment.noise[..., np.newaxis]
-        for c, colour in enumerate(experiment.colours):
-            z[:, c] = innovations(z[:, c].T, colour).T
-        # what diverged with a change is a bad derivative, not an error
-        z = np.clip(np.nan_to_num(z.reshape(self.sizes[k], -1)), -bound, bound)
+        z = self._innovations(k, changes / self.experiments[k].noise[..., np.newaxis])
+        z = z.reshape(self.sizes[k], -1) / self.scale
         z[~self.valid[self.rows(k)]] = 0.0
-        return np.asarray(z)
+        return self._without_process(k, z)
+
+    def _innovations(self, k: int, changes: FloatArray) -> FloatArray:
+        """Return changes in standard deviations, shape (w, c, m), as white noise has them."""
+        for c, colour in enumerate(self.experiments[k].colours):
+            changes[:, c] = innovations(changes[:, c].T, colour).T
+        # what diverged with a change is a bad derivative, not an error
+        bound = self.settings.fit.runaway
+        return np.clip(np.nan_to_num(changes), -bound, bound)
 
     def _without_process(self, k: int, z: FloatArray) -> FloatArray:
-        process = self.experiments[k].process
-        if process is None:
+        experiment = self.experiments[k]
+        if experiment.process is None:
             return z
         if k not in self._process:
-            self._process[k] = ProcessNoise.of(self._scaled(k, process))
+            # a filter of slow noise goes on for a while after a response
+            pulses = experiment.process.pulses
+            longer = replace(pulses, values=np.concatenate([
+                pulses.values, np.zeros_like(pulses.values)]))
+            white = self._innovations(k, longer.values / longer.during(experiment.noise))
+            seen = sparse.diags_array(self.valid[self.rows(k)].astype(float))
+            self._process[k] = ProcessNoise.of(
+                seen @ replace(longer, values=white).matrix(experiment.time.size),
+                experiment.process.root)
         return self._process[k].whitened(z, self.scale)
 
     def residuals(self, point: dict[str, float]) -> FloatArray:
@@ -117,21 +131,20 @@ class LeastSquares:
         return robust_level(residual[self.valid] * self.scale, self.settings.fit.outlier)
 
     def jacobian(self, point: dict[str, float], parameters: Sequence[Parameter],
-                 residual: FloatArray, central: bool,
+                 residual: FloatArray | None, central: bool,
                  steps: Mapping[str, float] = MappingProxyType({})) -> Jacobian:
         """
         Return the derivative of the prediction at a point by difference quotients, shape (n, m).
 
-        `residual`, at the point, serves one-sided differences; `central` takes central ones where
-        the bounds leave room. `steps` has unusual steps by name.
+        `residual`, at the point if known, serves one-sided differences; `central` takes central
+        ones where the bounds leave room. `steps` has unusual steps by name.
         """
         variants, only, plan = [], [], []
         sizes = [steps.get(item.name, item.step) for item in parameters]
-        jacobian = np.zeros((residual.size, len(parameters)), np.float32)
+        known = {j: column for j, item in enumerate(parameters)
+                 if (column := self._linear_column(item)) is not None}
         for j, item in enumerate(parameters):
-            column = self._linear_column(item)
-            if column is not None:
-                jacobian[:, j] = column
+            if j in known:
                 continue
             here, step = point.get(item.name, 0.0), sizes[j]
             # a value at a bound may be off it by a rounding error
@@ -147,25 +160,34 @@ class LeastSquares:
                 only.append(item.experiment)
                 plan.append((j, side, len(sides)))
         machine = self.machine.low_fidelity()
-        if machine is not self.machine and variants:
+        if variants and (residual is None or machine is not self.machine):
             # both runs of a difference must have the same fidelity
             residual = self._row(machine.simulate([point])[0])
+        jacobian = np.zeros((self.valid.size, len(parameters)))
+        # what each difference has of the residual at the point, by experiment
+        shares = np.zeros((len(self.experiments), len(parameters)))
         chunk = self.settings.fit.batch
         for first in range(0, len(variants), chunk):
             part = slice(first, first + chunk)
             results = machine.simulate(variants[part], only[part])
             for (j, side, count), result in zip(plan[part], results, strict=True):
                 for k, values in enumerate(result):
-                    if values is None:
-                        continue
-                    rows = self.rows(k)
-                    change = residual[rows] - self.standardised(k, values)
-                    jacobian[rows, j] += side * change / (sizes[j] * count)
+                    if values is not None:
+                        share = side / (sizes[j] * count)
+                        shares[k, j] += share
+                        jacobian[self.rows(k), j] -= share * self._of_sensors(k, values)
+        for k in range(len(self.experiments)):
+            there = np.flatnonzero(jacobian[rows := self.rows(k)].any(axis=0))
+            jacobian[rows, there] = self._without_process(k, jacobian[rows, there])
+            if residual is not None:
+                jacobian[rows] += residual[rows, np.newaxis] * shares[k]
+        for j, column in known.items():
+            jacobian[:, j] = column
         for j, item in enumerate(parameters):
             greatest = float(np.abs(jacobian[:, j]).max(initial=0.0))
             if greatest * sizes[j] < self.settings.fit.dead_column:
                 jacobian[:, j] = 0.0
-        return jacobian
+        return jacobian.astype(np.float32)
 
     def _linear_column(self, item: Parameter) -> Jacobian | None:
         """Return the derivative by a number in which the machine is linear; None for another."""

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import linalg, sparse
 from simgap.machine.contract import Experiment, FloatArray
 
 # Directions in which the process moves readings by a smaller share of their noise do not count.
@@ -24,22 +25,26 @@ _LEAST = 0.1
 class ProcessNoise:
     """Noise of the process in readings whose sensors' noise is white and of variance 1."""
 
-    directions: NDArray[np.float32]  # orthonormal, shape (n, k)
-    deviations: FloatArray  # of the process in them, shape (k,)
+    responses: sparse.csr_array  # to pulses, which end soon, shape (n, m)
+    transposed: sparse.csr_array  # the same, shape (m, n)
+    turns: NDArray[np.float32]  # of them into orthonormal directions, shape (m, k)
+    deviations: FloatArray  # of the process in these, shape (k,)
 
     @classmethod
-    def of(cls, columns: FloatArray) -> ProcessNoise:
-        """Return that of a response to independent inputs of variance 1, shape (n, m)."""
-        squares, vectors = np.linalg.eigh(columns.T @ columns)
+    def of(cls, responses: sparse.csr_array, root: FloatArray) -> ProcessNoise:
+        """Return that of responses, shape (n, m), to pulses whose covariance has a root."""
+        single, root = responses.astype(np.float32), root.astype(np.float32)
+        squares, vectors = np.linalg.eigh(root.T @ (single.T @ single).toarray() @ root)
         kept = squares > _LEAST ** 2
-        deviations = np.sqrt(squares[kept])
-        return cls((columns @ (vectors[:, kept] / deviations)).astype(np.float32), deviations)
+        deviations = np.sqrt(squares[kept]).astype(float)
+        turns = root @ (vectors[:, kept] / deviations.astype(np.float32))
+        return cls(single, single.T.tocsr(), turns, deviations)
 
     def whitened(self, residual: FloatArray, scale: float) -> FloatArray:
         """Return residuals, shape (n,) or (n, m), that are white, at a scale of the noise."""
         share = 1.0 - 1.0 / np.hypot(1.0, self.deviations / scale)
-        along = self.directions.T @ residual.astype(np.float32)
-        return residual - self.directions @ (share * along.T).T.astype(np.float32)
+        along = self.turns.T @ (self.transposed @ residual.astype(np.float32))
+        return residual - self.responses @ (self.turns @ (share * along.T).T.astype(np.float32))
 
 
 def without_process(experiment: Experiment, residual: FloatArray, bound: float) -> FloatArray:
@@ -50,8 +55,10 @@ def without_process(experiment: Experiment, residual: FloatArray, bound: float) 
     """
     if experiment.process is None:
         return residual
-    there = np.isfinite(residual)
-    z = np.clip(residual / experiment.noise, -bound, bound)[there]
-    columns = (experiment.process / experiment.noise[..., np.newaxis])[there]
-    square = columns.T @ columns + np.eye(columns.shape[1])
-    return residual - experiment.process @ np.linalg.solve(square, columns.T @ z)
+    there, root = np.isfinite(residual), experiment.process.root
+    z = np.where(there, np.clip(residual / experiment.noise, -bound, bound), 0.0).ravel()
+    responses = experiment.process.pulses.matrix(len(residual))
+    seen = sparse.diags_array((there / experiment.noise).ravel()) @ responses
+    square = root.T @ (seen.T @ seen).toarray() @ root + np.eye(len(root))
+    heights = root @ linalg.solve(square, root.T @ (seen.T @ z), assume_a='pos')
+    return residual - (responses @ heights).reshape(residual.shape)

@@ -65,6 +65,11 @@ class Form:
         return {p.name: p.start for p in self.parameters}
 
     @property
+    def shapes(self) -> dict[str, float]:
+        """Return a point without the effect, at which derivatives by its sizes are taken."""
+        return {p.name: p.start for p in self.parameters if p.is_shape}
+
+    @property
     def trials(self) -> list[dict[str, float]]:
         """Return sizes to try of a single one, as shares of its bounds."""
         if len(self.sizes) != 1:

@@ -24,6 +24,7 @@ from simgap.machine.effect import Effect, Form, Parameter
 from simgap.machine.experiment import Experiment
 from simgap.machine.machine import DisturbanceInput, Machine, Wrapped
 from simgap.machine.pulses import process
+from simgap.machine.responses import ProcessResponses
 
 # The standard deviation of an everyday size, as a share of the tolerance.
 EVERYDAY = 0.5
@@ -132,15 +133,14 @@ class _Everyday(Wrapped):
 
     def __init__(self, inner: Machine, sizes: tuple[_Size, ...],
                  responses: Sequence[NDArray[np.floating[Any]]],
-                 process: Sequence[FloatArray | None]) -> None:
+                 process: Sequence[ProcessResponses | None]) -> None:
         numbers = [Parameter(_PREFIX + p.name, p.unit, -p.tolerance, p.tolerance, p.step,
                              EVERYDAY * p.tolerance) for p in (size.parameter for size in sizes)]
         self._place = {p.name: j for j, p in enumerate(numbers)}
         nuisances = copy(inner.nuisances)
         nuisances.extend(numbers)
         super().__init__(inner, [
-            replace(e, process=None if part is None else part[:e.time.size])
-            for e, part in zip(inner.experiments, process, strict=True)],
+            replace(e, process=part) for e, part in zip(inner.experiments, process, strict=True)],
             nuisances, inner.catalogue)
         self._sizes = sizes
         # single precision: they are read at every run
@@ -193,7 +193,7 @@ class _Everyday(Wrapped):
         return self if inner is self.inner else self._around(
             inner, [e.process for e in self.experiments])
 
-    def _around(self, inner: Machine, process: Sequence[FloatArray | None]) -> Machine:
+    def _around(self, inner: Machine, process: Sequence[ProcessResponses | None]) -> Machine:
         # a truncated machine has the first part of each test
         return _Everyday(inner, self._sizes, [
             response[:e.measured.size] for e, response in zip(

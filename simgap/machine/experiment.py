@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from simgap.machine.arrays import FloatArray
+from simgap.machine.responses import ProcessResponses
 
 
 @dataclass(frozen=True)
@@ -39,8 +40,7 @@ class Experiment:
     quantised : names of signals whose residual at rest is a fraction of a digit, not noise
     model_error : slow error of a right model, shape (c,), as read; None for a usual share
     colours : of the noise of each signal, as a diagnosis finds it; empty for white noise
-    process : what acts on the machine every day: response of the readings to k independent inputs
-        of variance 1, shape (n, c, k); None for nothing
+    process : what acts on the machine every day; None for nothing
     labels : what was different in this test, such as load: A; see `interventions`
     excerpt : of which recording it is; None if that is not known
     """
@@ -54,7 +54,7 @@ class Experiment:
     quantised: tuple[str, ...] = ()
     model_error: FloatArray | None = None
     colours: tuple[Colour, ...] = ()
-    process: FloatArray | None = None
+    process: ProcessResponses | None = None
     labels: Mapping[str, str] = field(default_factory=dict)
     excerpt: Excerpt | None = None
 

@@ -36,9 +36,7 @@ class DisturbanceInput:
 
     name: str  # unique in its machine, for people
     component: str  # the part of the machine that it acts on
-    # what acts there every day: its rms, and the time within which it changes [s]
-    everyday: float = field(default=0.0, kw_only=True)
-    everyday_s: float = field(default=1.0, kw_only=True)
+    everyday: float = field(default=0.0, kw_only=True)  # rms of what acts there every day
 
 
 class Machine(ABC):

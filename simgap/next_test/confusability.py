@@ -71,7 +71,7 @@ def visibility(problem: LeastSquares, state: FitState,
         progress(i / len(asked))
         form = machine.catalogue.typical_form(effect)
         first = form.parameters[0]
-        column = problem.jacobian({**here, **form.start}, [first], state.residual,
+        column = problem.jacobian({**here, **form.shapes}, [first], state.residual,
                                   central=False)[:, 0]
         cross = jacobian.T @ column.astype(float)
         ids.append(effect.id)

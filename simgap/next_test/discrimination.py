@@ -52,7 +52,7 @@ def deviations(machine: Machine, rival: Rival, inflated: float,
     point = known_to(machine, rival)
     problem = planned(with_process(machine), [rival], [point])
     numbers = numbers_of(machine, rival)
-    jacobian = problem.jacobian(point, numbers, problem.residuals(point), central=False)
+    jacobian = problem.jacobian(point, numbers, None, central=False)
     known = (jacobian.T @ jacobian).astype(float) + _precision(rival, numbers, inflated)
     names = [p.name for p in numbers if p.name in rival.names]
     places = [j for j, p in enumerate(numbers) if p.name in rival.names]
@@ -81,7 +81,7 @@ def _followed(problem: LeastSquares, rival: Rival, point: dict[str, float], off:
     numbers = numbers_of(problem.machine, rival)
     if not numbers:
         return np.zeros(len(off)), off
-    jacobian = problem.jacobian(point, numbers, problem.residuals(point), central=False)
+    jacobian = problem.jacobian(point, numbers, None, central=False)
     precision = _precision(rival, numbers, inflated)
     known = (jacobian.T @ jacobian).astype(float) + precision
     slopes = (off.astype(np.float32) @ jacobian).astype(float)

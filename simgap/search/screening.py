@@ -47,7 +47,7 @@ def jacobian_of_form(problem: LeastSquares, state: FitState, form: Form) -> Jaco
     columns = np.zeros((state.residual.size, len(form.parameters)), np.float32)
     sizes = [j for j, p in enumerate(form.parameters) if not p.is_shape]
     columns[:, sizes] = problem.jacobian(
-        {**state.point(), **form.start}, [form.parameters[j] for j in sizes], state.residual,
+        {**state.point(), **form.shapes}, [form.parameters[j] for j in sizes], state.residual,
         central=form.scanned)
     return columns
 

@@ -241,7 +241,7 @@ class Search:
     def _slopes(self, at: Hypothesis) -> Jacobian:
         point = at.state.point()
         return self._problem.jacobian(
-            point, self._problem.machine.nuisances, self._problem.residuals(point), False,
+            point, self._problem.machine.nuisances, None, False,
             self._problem.local_steps(at.state))
 
     def _continued(self, none: Hypothesis) -> list[Hypothesis]:

@@ -84,7 +84,7 @@ class InputEvidence:
         best, share, heights = 0.0, 0.0, np.zeros(len(square))
         size = float(np.trace(square)) / len(square)
         for pulses in smooth if size > 0.0 else ():
-            roots = [root(count, pulses) for count in counts]
+            roots = [root(count, pulses) if pulses else np.eye(count) for count in counts]
             found, explained, factors = self.weighed(
                 _rows(roots, _rows(roots, square).T), _rows(roots, slope), size)
             if found > best:

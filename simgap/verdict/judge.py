@@ -78,7 +78,7 @@ class Judge:
                         key=lambda trial: problem.loss(problem.residuals(trial)))
         added = part.parameters([p for p in self._best.state.parameters
                                  if p.name in self._effects])
-        fresh = problem.jacobian(point, added, problem.residuals(point), central=True)
+        fresh = problem.jacobian(point, added, None, central=True)
         start = problem.start((*unaided.parameters, *added), point,
                               np.column_stack([unaided.jacobian, fresh]))
         found = settled(problem, problem.fit(start, self._settings.search.iterations), 1)

@@ -76,8 +76,10 @@ def _columns(problem: LeastSquares, point: Mapping[str, float],
              place: DisturbanceInput) -> tuple[list[FloatArray], list[FloatArray]]:
     """Return the response to each pulse at a place, and when each pulse has its peak [s]."""
     # Both are for each experiment; responses have the shape (n c, pulses), peaks (pulses,).
-    responses, peaks = pulse_responses(problem.machine, dict(point), place)
-    return [problem.whitened(k, item) for k, item in enumerate(responses)], peaks
+    found = pulse_responses(problem.machine, dict(point), place)
+    return ([problem.whitened(k, pulses.matrix(len(e.time)).toarray().reshape(
+        *e.measured.shape, -1)) for k, (e, (pulses, _)) in enumerate(zip(
+            problem.experiments, found, strict=True))], [peaks for _, peaks in found])
 
 
 def components(found: Sequence[Place], caution: float) -> dict[str, float]:

@@ -108,8 +108,8 @@ def test_the_next_test_is_told_where_something_without_a_name_may_act(
 class PushedEveryDay(TwoLags):
     """The same, with a force on the left every day."""
 
-    disturbance_inputs = (DisturbanceInput('force on the left', 'left', everyday=0.5,
-                                           everyday_s=0.5), TwoLags.disturbance_inputs[1])
+    disturbance_inputs = (DisturbanceInput('force on the left', 'left', everyday=0.5),
+                          TwoLags.disturbance_inputs[1])
 
 
 def test_a_force_of_every_day_is_no_gap_and_more_of_it_is_found_in_its_place() -> None:

@@ -5,32 +5,48 @@
 import numpy as np
 import pytest
 from simgap.fit.process_noise import ProcessNoise, without_process
-from simgap.machine.contract import Experiment
+from simgap.machine.contract import Experiment, FloatArray
+from simgap.machine.responses import ProcessResponses, Responses
 
-COUNT = 60
+COUNT, WIDTH = 60, 9
 RANDOM = np.random.default_rng(7)
-COLUMNS = 3.0 * RANDOM.normal(size=(COUNT, 5))
+ROOT = np.tril(RANDOM.normal(size=(5, 5)))
+# of two readings, the last of which ends after the test
+PULSES = Responses(np.array([0, 4, 9, 15, 26]), RANDOM.normal(size=(WIDTH, 2, 5)))
+
+
+def columns() -> FloatArray:
+    """Return the responses as a matrix, shape (n c, m), by a loop."""
+    whole = np.zeros((COUNT // 2 + WIDTH, 2, 5))
+    for j, first in enumerate(PULSES.first):
+        whole[first:first + WIDTH, :, j] = PULSES.values[:, :, j]
+    return whole[:COUNT // 2].reshape(COUNT, 5)
+
+
+def test_responses_lie_where_each_begins() -> None:
+    assert (PULSES.matrix(COUNT // 2).toarray() == columns()).all()
 
 
 @pytest.mark.parametrize('scale', [1.0, 4.0])
 def test_residuals_are_white_under_the_covariance_of_sensors_and_process(scale: float) -> None:
-    root = ProcessNoise.of(COLUMNS).whitened(np.eye(COUNT), scale)
-    covariance = np.eye(COUNT) + COLUMNS @ COLUMNS.T / scale ** 2
+    noise = ProcessNoise.of(PULSES.matrix(COUNT // 2), ROOT)
+    root, moves = noise.whitened(np.eye(COUNT), scale), columns() @ ROOT
+    covariance = np.eye(COUNT) + moves @ moves.T / scale ** 2
     assert root @ covariance @ root.T == pytest.approx(np.eye(COUNT), abs=1e-4)
 
 
 def test_what_the_process_does_is_its_conditional_mean() -> None:
     noise = RANDOM.uniform(0.5, 2.0, (COUNT // 2, 2))
-    process = (COLUMNS.reshape(COUNT // 2, 2, 5) * noise[..., np.newaxis])
-    residual = noise * RANDOM.normal(size=noise.shape) + process @ RANDOM.normal(size=5)
+    moves = columns() @ ROOT
+    residual = noise * RANDOM.normal(size=noise.shape) + (
+        moves @ RANDOM.normal(size=5)).reshape(noise.shape)
     measured = residual.copy()
     measured[3, 1] = residual[3, 1] = np.nan
     experiment = Experiment('test', np.arange(0.0, COUNT // 2), ('a', 'b'), ('1', '1'), measured,
-                            noise, process=process)
+                            noise, process=ProcessResponses(PULSES, ROOT))
     left = without_process(experiment, residual, bound=1e9)
     # of jointly normal numbers
     there = np.isfinite(residual).ravel()
-    moves = process.reshape(COUNT, 5)
     sum_of_both = (moves @ moves.T + np.diag(noise.ravel() ** 2))[np.ix_(there, there)]
     mean = moves @ moves[there].T @ np.linalg.solve(sum_of_both, residual.ravel()[there])
     assert left.ravel()[there] == pytest.approx((residual.ravel() - mean)[there], abs=1e-9)

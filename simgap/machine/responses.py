@@ -1,0 +1,62 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""Responses of a test's readings to pulses of an input, each of which ends soon."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg, sparse
+from simgap.machine.arrays import FloatArray
+
+
+@dataclass(frozen=True)
+class Responses:
+    """
+    Responses to m pulses in a test with c readings, w samples of each.
+
+    first : sample at which each begins, shape (m,)
+    values : of the readings from there on, shape (w, c, m)
+    """
+
+    first: NDArray[np.intp]
+    values: FloatArray
+
+    @classmethod
+    def of(cls, first: Sequence[int], values: Sequence[FloatArray]) -> 'Responses':
+        """Put responses together, shape (w, c) with any w each."""
+        whole = np.zeros((max(map(len, values)), values[0].shape[1], len(values)))
+        for j, part in enumerate(values):
+            whole[:len(part), :, j] = part
+        return cls(np.array(first), whole)
+
+    def during(self, values: FloatArray) -> FloatArray:
+        """Return values of a test, shape (n, c), during each response, shape (w, c, m)."""
+        rows = np.arange(len(self.values))[:, np.newaxis] + self.first
+        return np.asarray(values[np.minimum(rows, len(values) - 1)].transpose(0, 2, 1))
+
+    def matrix(self, samples: int) -> sparse.csr_array:
+        """Return the responses in a test of so many samples, shape (n c, m)."""
+        width, channels, count = self.values.shape
+        sample = np.arange(width)[:, np.newaxis, np.newaxis] + self.first
+        row = sample * channels + np.arange(channels)[:, np.newaxis]
+        kept = (self.values != 0.0) & (sample < samples)
+        column = np.broadcast_to(np.arange(count), self.values.shape)
+        return sparse.csr_array((self.values[kept], (row[kept], column[kept])),
+                                (samples * channels, count))
+
+
+@dataclass(frozen=True)
+class ProcessResponses:
+    """What acts on a machine every day: responses to pulses, and a root of their covariance."""
+
+    pulses: Responses
+    root: FloatArray  # shape (m, m)
+
+    @classmethod
+    def of(cls, parts: Sequence['ProcessResponses']) -> 'ProcessResponses':
+        """Put together what acts at several places."""
+        return cls(Responses(np.concatenate([p.pulses.first for p in parts]),
+                             np.concatenate([p.pulses.values for p in parts], axis=-1)),
+                   linalg.block_diag(*(p.root for p in parts)))
