@@ -104,15 +104,14 @@ class LeastSquares:
         if experiment.process is None:
             return z
         if k not in self._process:
-            # a filter of slow noise goes on for a while after a response
-            pulses = experiment.process.pulses
-            longer = replace(pulses, values=np.concatenate([
-                pulses.values, np.zeros_like(pulses.values)]))
-            white = self._innovations(k, longer.values / longer.during(experiment.noise))
+            white = replace(experiment.process, parts=[
+                replace(longer, values=self._innovations(
+                    k, longer.values / longer.during(experiment.noise)))
+                # a filter of slow noise goes on for a while after a response
+                for longer in (part.longer() for part in experiment.process.parts)])
             seen = sparse.diags_array(self.valid[self.rows(k)].astype(float))
             self._process[k] = ProcessNoise.of(
-                seen @ replace(longer, values=white).matrix(experiment.time.size),
-                experiment.process.root)
+                seen @ white.matrix(experiment.time.size), white.root)
         return self._process[k].whitened(z, self.scale)
 
     def residuals(self, point: dict[str, float]) -> FloatArray:

@@ -57,8 +57,8 @@ def without_process(experiment: Experiment, residual: FloatArray, bound: float) 
         return residual
     there, root = np.isfinite(residual), experiment.process.root
     z = np.where(there, np.clip(residual / experiment.noise, -bound, bound), 0.0).ravel()
-    responses = experiment.process.pulses.matrix(len(residual))
+    responses = experiment.process.matrix(len(residual))
     seen = sparse.diags_array((there / experiment.noise).ravel()) @ responses
-    square = root.T @ (seen.T @ seen).toarray() @ root + np.eye(len(root))
+    square = root.T @ (seen.T @ seen).toarray() @ root + np.eye(root.shape[1])
     heights = root @ linalg.solve(square, root.T @ (seen.T @ z), assume_a='pos')
     return residual - (responses @ heights).reshape(residual.shape)

@@ -12,7 +12,7 @@ nuisance costs no run. Inputs that are there every day, such as wind, are noise 
 
 from collections.abc import Iterator, Sequence
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 import math
 from typing import Any
 
@@ -23,7 +23,7 @@ from simgap.machine.catalogue import Catalogue
 from simgap.machine.effect import Effect, Form, Parameter
 from simgap.machine.experiment import Experiment
 from simgap.machine.machine import DisturbanceInput, Machine, Wrapped
-from simgap.machine.pulses import process
+from simgap.machine.process import acting, calm, process
 from simgap.machine.responses import ProcessResponses
 
 # The standard deviation of an everyday size, as a share of the tolerance.
@@ -140,7 +140,7 @@ class _Everyday(Wrapped):
         nuisances = copy(inner.nuisances)
         nuisances.extend(numbers)
         super().__init__(inner, [
-            replace(e, process=part) for e, part in zip(inner.experiments, process, strict=True)],
+            acting(e, part) for e, part in zip(inner.experiments, process, strict=True)],
             nuisances, inner.catalogue)
         self._sizes = sizes
         # single precision: they are read at every run
@@ -200,7 +200,7 @@ class _Everyday(Wrapped):
                 inner.experiments, self._responses, strict=True)], process)
 
     def with_experiments(self, experiments: Sequence[Experiment]) -> Machine:
-        return self._around(self.inner.with_experiments(experiments),
+        return self._around(self.inner.with_experiments(list(map(calm, experiments))),
                             [e.process for e in experiments])
 
     def with_noise_at(self, point: Point) -> Machine:

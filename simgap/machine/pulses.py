@@ -3,7 +3,6 @@
 """How a machine answers an input of any course over time: the sum of its answers to pulses."""
 
 from collections.abc import Iterator
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -13,18 +12,12 @@ from simgap.machine.arrays import FloatArray, Point
 from simgap.machine.experiment import Experiment
 from simgap.machine.machine import DisturbanceInput, Machine
 from simgap.machine.motion import TimeScales
-from simgap.machine.responses import ProcessResponses, Responses
-
-# Pulses of an input of every day in one of an unknown input: it moves what resonates, too.
-_FINER = 2
-# Times of change in its covariance.
-_TIMES = 8
+from simgap.machine.responses import Responses
 
 
-def pulse_responses(machine: Machine, point: Point, place: DisturbanceInput, size: float = 1.0,
-                    finer: int = 1) -> list[tuple[Responses, FloatArray]]:
+def pulse_responses(machine: Machine, point: Point, place: DisturbanceInput, scales: TimeScales,
+                    size: float = 1.0) -> list[tuple[Responses, FloatArray]]:
     """Return each test's responses to pulses of a size at a place, and when they peak [s]."""
-    scales = replace(machine.time_scales, pulse_s=machine.time_scales.pulse_s / finer)
     calm = [machine.predict(point, k) for k in range(len(machine.experiments))]
     parts: list[list[tuple[float, int, FloatArray]]] = [[] for _ in calm]
     for shift in np.arange(0.0, scales.response_s - 0.5 * scales.pulse_s, scales.pulse_s):
@@ -38,26 +31,6 @@ def pulse_responses(machine: Machine, point: Point, place: DisturbanceInput, siz
         starts, first, values = zip(*sorted(pulses, key=lambda item: item[0]), strict=True)
         found.append((Responses.of(first, values), np.array(starts) + scales.pulse_s))
     return found
-
-
-def process(machine: Machine, point: Point) -> list[ProcessResponses | None]:
-    """Return of each experiment the response to what acts every day, see `Experiment.process`."""
-    found: list[list[ProcessResponses]] = [[] for _ in machine.experiments]
-    faster = machine.low_fidelity()
-    for place in faster.disturbance_inputs:
-        if place.everyday:
-            for into, (responses, peaks) in zip(found, pulse_responses(
-                    faster, point, place, place.everyday, _FINER), strict=True):
-                # it may change at any rate: as much in each octave, between a pulse and the test
-                into.append(ProcessResponses(responses, root(
-                    peaks.size, np.geomspace(1.0, peaks.size, _TIMES))))
-    return [ProcessResponses.of(parts) if parts else None for parts in found]
-
-
-def with_process(machine: Machine) -> Machine:
-    """Return a machine in planned tests, in which what acts every day acts as well."""
-    return machine.with_experiments([replace(e, process=part) for e, part in zip(
-        machine.experiments, process(machine, {}), strict=True)])
 
 
 def root(count: int, times: ArrayLike) -> FloatArray:

@@ -31,6 +31,10 @@ class Responses:
             whole[:len(part), :, j] = part
         return cls(np.array(first), whole)
 
+    def longer(self) -> 'Responses':
+        """Return responses that are watched for twice as long."""
+        return Responses(self.first, np.concatenate([self.values, np.zeros_like(self.values)]))
+
     def during(self, values: FloatArray) -> FloatArray:
         """Return values of a test, shape (n, c), during each response, shape (w, c, m)."""
         rows = np.arange(len(self.values))[:, np.newaxis] + self.first
@@ -49,14 +53,25 @@ class Responses:
 
 @dataclass(frozen=True)
 class ProcessResponses:
-    """What acts on a machine every day: responses to pulses, and a root of their covariance."""
+    """
+    What acts on a machine every day, in a test.
 
-    pulses: Responses
-    root: FloatArray  # shape (m, m)
+    parts : responses to pulses, m of them in all
+    root : of the covariance of the pulses' heights, shape (m, k)
+    beyond : rms of what it does to the readings beyond these responses, shape (n, c)
+    """
+
+    parts: Sequence[Responses]
+    root: FloatArray
+    beyond: FloatArray
 
     @classmethod
-    def of(cls, parts: Sequence['ProcessResponses']) -> 'ProcessResponses':
-        """Put together what acts at several places."""
-        return cls(Responses(np.concatenate([p.pulses.first for p in parts]),
-                             np.concatenate([p.pulses.values for p in parts], axis=-1)),
-                   linalg.block_diag(*(p.root for p in parts)))
+    def together(cls, places: Sequence['ProcessResponses']) -> 'ProcessResponses':
+        """Return that of several places."""
+        return cls([part for place in places for part in place.parts],
+                   linalg.block_diag(*(place.root for place in places)),
+                   np.sqrt(np.sum([place.beyond ** 2 for place in places], axis=0)))
+
+    def matrix(self, samples: int) -> sparse.csr_array:
+        """Return the responses in a test of so many samples, shape (n c, m)."""
+        return sparse.hstack([part.matrix(samples) for part in self.parts], 'csr')

@@ -17,7 +17,7 @@ from simgap.fit.noise import with_model_error
 from simgap.fit.state import FitState, prior_precision, proper_precision
 from simgap.machine.contract import FloatArray, Machine, Parameter
 from simgap.machine.everyday import everyday_of
-from simgap.machine.pulses import with_process
+from simgap.machine.process import with_process
 from simgap.settings import DEFAULT
 
 # A size is found to this share of itself.
@@ -138,7 +138,7 @@ def _least_visible(number: Parameter, power: float, free: float, left: Callable[
 def could_hide(problem: LeastSquares, state: FitState,
                inflated: float = 1.0) -> list[dict[str, Any]]:
     """Return how large each effect could be and still hide in these tests, for the JSON."""
-    found = visibility(problem, problem.refreshed(state), inflated=inflated)
+    found = visibility(problem, state, inflated=inflated)
     return [{'effect': effect, 'size': float(size) if np.isfinite(size) else None, 'unit': unit}
             for effect, size, unit in zip(found.effects, found.detectable, found.units,
                                           strict=True)]

@@ -12,7 +12,7 @@ from simgap.fit.least_squares import LeastSquares
 from simgap.fit.noise import with_model_error
 from simgap.fit.state import proper_precision
 from simgap.machine.contract import FloatArray, Machine, Parameter, Point
-from simgap.machine.pulses import with_process
+from simgap.machine.process import with_process
 from simgap.next_test.rivals import known_to, numbers_of
 from simgap.next_test.separation import LEAST, prior_of, Separation
 from simgap.search.rival import Rival

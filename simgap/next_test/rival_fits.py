@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 from simgap.fit.least_squares import LeastSquares
 from simgap.machine.contract import FloatArray, Machine, Parameter, Point
-from simgap.machine.pulses import with_process
+from simgap.machine.process import with_process
 from simgap.next_test.discrimination import planned
 from simgap.next_test.rivals import known_to, numbers_of
 from simgap.next_test.separation import prior_of, Separation

@@ -66,8 +66,9 @@ def _diagnose(machine: Machine, progress: Progress, threads: int, settings: Sett
         unnamed={part: decision.unknown * share for part, share in parts.items()
                  if decision.unknown * share >= settings.verdict.least_probability})
     healthy = decision.word == 'no_gap'
-    hidden = could_hide(problem, (none if healthy else best).state, findings.inflated) if (
-        healthy or not findings.are_open(settings)) else []
+    hidden = could_hide(
+        problem, (none if healthy else best).with_jacobian(problem).state, findings.inflated) if (
+            healthy or not findings.are_open(settings)) else []
     planning = {
         **machine.planning,
         **replace(findings, shown={item['effect']: item['size'] for item in hidden

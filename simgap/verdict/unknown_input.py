@@ -76,7 +76,7 @@ def _columns(problem: LeastSquares, point: Mapping[str, float],
              place: DisturbanceInput) -> tuple[list[FloatArray], list[FloatArray]]:
     """Return the response to each pulse at a place, and when each pulse has its peak [s]."""
     # Both are for each experiment; responses have the shape (n c, pulses), peaks (pulses,).
-    found = pulse_responses(problem.machine, dict(point), place)
+    found = pulse_responses(problem.machine, dict(point), place, problem.machine.time_scales)
     return ([problem.whitened(k, pulses.matrix(len(e.time)).toarray().reshape(
         *e.measured.shape, -1)) for k, (e, (pulses, _)) in enumerate(zip(
             problem.experiments, found, strict=True))], [peaks for _, peaks in found])

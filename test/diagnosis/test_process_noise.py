@@ -43,7 +43,7 @@ def test_what_the_process_does_is_its_conditional_mean() -> None:
     measured = residual.copy()
     measured[3, 1] = residual[3, 1] = np.nan
     experiment = Experiment('test', np.arange(0.0, COUNT // 2), ('a', 'b'), ('1', '1'), measured,
-                            noise, process=ProcessResponses(PULSES, ROOT))
+                            noise, process=ProcessResponses([PULSES], ROOT, 0.0 * noise))
     left = without_process(experiment, residual, bound=1e9)
     # of jointly normal numbers
     there = np.isfinite(residual).ravel()
