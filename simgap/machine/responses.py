@@ -52,16 +52,43 @@ class Responses:
 
 
 @dataclass(frozen=True)
-class ProcessResponses:
+class _Parts:
+    """Responses to pulses of several kinds, m of them in all."""
+
+    parts: Sequence[Responses]
+
+    def matrix(self, samples: int) -> sparse.csr_array:
+        """Return the responses in a test of so many samples, shape (n c, m)."""
+        return sparse.hstack([part.matrix(samples) for part in self.parts], 'csr')
+
+
+@dataclass(frozen=True)
+class Answers(_Parts):
+    """
+    Answers of a test's readings to an input with heights at even times, and lines between them.
+
+    mixed : what the pulses have of the heights, shape (m, k)
+    times : of the heights, shape (k,) [s]
+    """
+
+    mixed: FloatArray
+    times: FloatArray
+
+    def summed(self, heights: FloatArray, samples: int) -> FloatArray:
+        """Return the answers to heights, shape (k, ...), in so many samples, shape (n, c, ...)."""
+        moved = self.matrix(samples) @ (self.mixed @ heights)
+        return np.asarray(moved).reshape(samples, -1, *heights.shape[1:])
+
+
+@dataclass(frozen=True)
+class ProcessResponses(_Parts):
     """
     What acts on a machine every day, in a test.
 
-    parts : responses to pulses, m of them in all
-    root : of the covariance of the pulses' heights, shape (m, k)
+    root : of the covariance of what these have of the heights, shape (m, k)
     beyond : rms of what it does to the readings beyond these responses, shape (n, c)
     """
 
-    parts: Sequence[Responses]
     root: FloatArray
     beyond: FloatArray
 
@@ -71,7 +98,3 @@ class ProcessResponses:
         return cls([part for place in places for part in place.parts],
                    linalg.block_diag(*(place.root for place in places)),
                    np.sqrt(np.sum([place.beyond ** 2 for place in places], axis=0)))
-
-    def matrix(self, samples: int) -> sparse.csr_array:
-        """Return the responses in a test of so many samples, shape (n c, m)."""
-        return sparse.hstack([part.matrix(samples) for part in self.parts], 'csr')

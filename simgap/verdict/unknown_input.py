@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from simgap.fit.least_squares import LeastSquares
 from simgap.machine.contract import DisturbanceInput, FloatArray
-from simgap.machine.pulses import pulse_responses
+from simgap.machine.pulses import answers
 from simgap.verdict.input_evidence import InputEvidence
 from simgap.verdict.law import Law, likeliest, quantities_of
 
@@ -74,12 +74,12 @@ def courses(problem: LeastSquares, point: Mapping[str, float],
 
 def _columns(problem: LeastSquares, point: Mapping[str, float],
              place: DisturbanceInput) -> tuple[list[FloatArray], list[FloatArray]]:
-    """Return the response to each pulse at a place, and when each pulse has its peak [s]."""
-    # Both are for each experiment; responses have the shape (n c, pulses), peaks (pulses,).
-    found = pulse_responses(problem.machine, dict(point), place, problem.machine.time_scales)
-    return ([problem.whitened(k, pulses.matrix(len(e.time)).toarray().reshape(
-        *e.measured.shape, -1)) for k, (e, (pulses, _)) in enumerate(zip(
-            problem.experiments, found, strict=True))], [peaks for _, peaks in found])
+    """Return the answers to heights at a place, and when these are [s]."""
+    # Both are for each experiment; answers have the shape (n c, heights), times (heights,).
+    found = answers(problem.machine, dict(point), place)
+    return ([problem.whitened(k, own.summed(np.eye(own.times.size), e.time.size))
+             for k, (own, e) in enumerate(zip(found, problem.experiments, strict=True))],
+            [own.times for own in found])
 
 
 def components(found: Sequence[Place], caution: float) -> dict[str, float]:

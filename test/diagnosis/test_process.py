@@ -1,0 +1,103 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""What acts every day: its pattern where a machine is linear, and that there is none elsewhere."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from simgap.machine.contract import Course, DisturbanceInput, FloatArray, Machine, Point
+from simgap.machine.everyday import with_everyday
+from simgap.machine.process import acting, calm, process
+from two_lags import answered, TIME, TwoLags
+
+RMS = 0.5
+EVERY_DAY = (DisturbanceInput('force on the left', 'left', everyday=RMS),)
+
+
+class Pushed(TwoLags):
+    """Two lags, with a force on the left every day."""
+
+    disturbance_inputs = EVERY_DAY
+
+
+class Hunting(Pushed):
+    """The same, whose left reading is a wave of which a little force decides the phase."""
+
+    def simulate_disturbed(self, point: Point, place: DisturbanceInput,
+                           course: Course) -> list[FloatArray]:
+        """Return both readings with a force."""
+        readings = self.predict(point, 0)
+        readings[:, 0] = self._wave(30.0 * np.cumsum(course(TIME)) * TIME[1])
+        return [readings]
+
+    def predict(self, point: Point, experiment: int) -> FloatArray:
+        """Return both readings."""
+        return np.column_stack([self._wave(0.0 * TIME), 0.0 * TIME])
+
+    @staticmethod
+    def _wave(late: FloatArray) -> FloatArray:
+        return np.asarray(np.sin(2.0 * np.pi * 1.5 * TIME + late))
+
+
+def calm_machine(kind: type[TwoLags]) -> Machine:
+    """Return a machine on which no force acts."""
+    return kind(0.0 * TIME, 0.0 * TIME)
+
+
+def courses(count: int) -> FloatArray:
+    """Return courses with as much in each octave of time, as sums of lagged noise, (count, n)."""
+    random, step = np.random.default_rng(11), float(TIME[1] - TIME[0])
+    whole = np.zeros((count, TIME.size))
+    times = np.geomspace(0.075, TIME[-1], 8)
+    for time in times:
+        keep = np.exp(-step / time)
+        noise = np.sqrt(1.0 - keep ** 2) * random.normal(size=whole.shape)
+        state = random.normal(size=count)
+        for i in range(TIME.size):
+            state = keep * state + noise[:, i]
+            whole[:, i] += state
+    return RMS * whole / np.sqrt(times.size)
+
+
+def test_a_linear_machine_is_moved_as_the_covariance_says() -> None:
+    [found] = process(calm_machine(Pushed), {})
+    assert found is not None
+    moves = (found.matrix(TIME.size) @ found.root).reshape(TIME.size, 2, -1)
+    said = np.sqrt((moves ** 2).sum(axis=-1))
+    # answers to a force by the lag's own equation
+    seen = np.array([answered(course) for course in courses(300)])
+    inner = slice(TIME.size // 10, -TIME.size // 10)
+    assert said[inner, 0] == pytest.approx(np.sqrt((seen ** 2).mean(axis=0))[inner], rel=0.2)
+    covariance = moves[:, 0] @ moves[:, 0].T
+    sampled = seen.T @ seen / len(seen)
+    for apart in (TIME.size // 50, TIME.size // 10):
+        assert np.diag(covariance, apart)[inner] == pytest.approx(
+            np.diag(sampled, apart)[inner], abs=0.2 * float(said.max()) ** 2)
+    assert not said[:, 1].any()
+    assert np.all(found.beyond[inner, 0] < 0.2 * said[inner, 0])
+
+
+def test_where_sums_say_nothing_all_is_noise() -> None:
+    [found] = process(calm_machine(Hunting), {})
+    assert found is not None
+    late = 30.0 * np.cumsum(courses(300), axis=1) * TIME[1]
+    apart = np.sin(2.0 * np.pi * 1.5 * TIME + late) - np.sin(2.0 * np.pi * 1.5 * TIME)
+    end = slice(TIME.size // 2, -TIME.size // 10)
+    assert np.mean(found.beyond[end, 0]) == pytest.approx(
+        np.sqrt(np.mean(apart[:, end] ** 2)), rel=0.3)
+    moves = found.matrix(TIME.size) @ found.root
+    summed = np.sqrt((moves ** 2).sum(axis=-1)).reshape(TIME.size, 2)
+    assert np.mean(summed[end, 0]) < 0.5 * np.mean(found.beyond[end, 0])
+
+
+def test_noise_beyond_the_sums_is_added_once() -> None:
+    machine = with_everyday(calm_machine(Hunting))
+    [one] = machine.experiments
+    assert np.median(one.noise[:, 0]) > 10.0 * np.median(one.noise[:, 1])
+    again = machine.with_experiments([replace(one, colours=())])
+    assert again.experiments[0].noise == pytest.approx(one.noise, rel=1e-9)
+    bare = calm(one)
+    assert bare.process is None
+    assert acting(bare, one.process).noise == pytest.approx(one.noise, rel=1e-9)
+    assert acting(bare, None).noise == pytest.approx(bare.noise)
