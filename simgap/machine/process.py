@@ -85,8 +85,9 @@ def _linearised(own: Answers, summed: Sequence[FloatArray], seen: Sequence[Float
                 window: float) -> ProcessResponses:
     """Return answers in so far as their sums, shape (n, c) each, say what was seen."""
     def mean(products: Sequence[FloatArray]) -> FloatArray:
+        # a running sum may end a little below zero
         return np.asarray(uniform_filter1d(
-            np.mean(products, axis=0), max(int(window), 1), axis=0))
+            np.mean(products, axis=0), max(int(window), 1), axis=0)).clip(0.0)
 
     both = mean([one * other for one, other in zip(summed, seen, strict=True)])
     power = mean([one ** 2 for one in summed])
