@@ -78,7 +78,7 @@ class EvidenceSettings:
     sought: float = _at(
         4.0, 'log evidence', 'price of an order that was sought in the residual: one of about 50')
     form_error: float = _at(
-        0.07, '1', 'error of the form of an effect, as a share of what it does')
+        0.1, '1', 'error of the form of an effect, and of a model, as a share of what they do')
     number: float = _at(
         4.0, 'half chi-square', 'gain below which data do not show a number', PRACTICE)
     shows: float = _at(

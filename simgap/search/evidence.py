@@ -18,8 +18,8 @@ does not turn with its bounds; a shape has an even one within them. T is by how 
 a sample counts, because residuals are loud or correlated. Each effect has to gain, for itself,
 what shows an effect beside all that a model leaves out.
 
-No form of an effect is exact. What a further effect gains has to exceed the share of the whole
-gain that an error of form leaves.
+No form of an effect is exact, and no model. What an effect gains has to exceed the share of the
+whole gap that such an error leaves.
 """
 
 from __future__ import annotations
