@@ -17,14 +17,13 @@ from simgap.next_test import design
 from simgap.next_test.candidate import Candidate
 from simgap.next_test.design import CRITERIA, DesignEffort, TestDesign
 from simgap.next_test.proposal import as_data, contents, lines
-from simgap.next_test.rival_fits import confirmed_separation
 from simgap.next_test.rivals import Findings
-from simgap.next_test.separation import Separation
+from simgap.next_test.separation import Separation, separation
 from simgap.next_test.space import TestSpace
 from simgap.search.rival import Rival
 from simgap.settings import DEFAULT
 
-SMALL = DesignEffort(drawn=8, judged=6, varied=2, variants=2, confirmed=2)
+SMALL = DesignEffort(drawn=16, judged=12)
 
 
 class Lever(Machine):
@@ -108,8 +107,6 @@ def test_a_random_test_may_be_of_any_kind_that_is_allowed() -> None:
 
 def test_the_promise_for_the_best_test_is_confirmed_by_fits() -> None:
     found = TestDesign(Loads(1.6), Findings(HARD), effort=SMALL).run()
-    best = found.tests[0]
-    assert best.confirmed is not None and best.promised is not None
     data = as_data(found, Loads(1.6))
     assert data['expected']['confirmed']
     assert data['expected']['right_after'] > 0.95 > data['expected']['right_before']
@@ -118,7 +115,7 @@ def test_the_promise_for_the_best_test_is_confirmed_by_fits() -> None:
 
 
 class Promising(Loads):
-    """Great loads promise most, and there are enough of them to spend all fits on."""
+    """Great loads promise most."""
 
     families = ('modest', 'great')
 
@@ -126,33 +123,23 @@ class Promising(Loads):
         return float(random.uniform(*((0.3, 0.5) if family == 'modest' else (1.2, 1.6))))
 
 
-def test_where_a_family_breaks_its_promises_another_one_is_confirmed(
-        monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize('kept, family', [(1.0, 'great'), (1e-3, 'modest')])
+def test_what_a_test_promises_counts_as_far_as_fits_keep_it(
+        kept: float, family: str, monkeypatch: pytest.MonkeyPatch) -> None:
     def fitted(machine: Lever, *rest: Any) -> Separation:
-        told = confirmed_separation(machine, *rest)
-        return replace(told, lack=1e-3 * told.lack) if machine.load > 1.0 else told
+        told = separation(machine, *rest)
+        return replace(told, lack=kept * told.lack) if machine.load > 1.0 else told
 
-    monkeypatch.setattr(design, 'confirmed_separation', fitted)
+    monkeypatch.setattr(design, 'separation', fitted)
     found = TestDesign(Promising(2.0), Findings(HARD), effort=SMALL).run()
-    great = [test for test in found.tests if test.family == 'great']
-    assert len(great) > SMALL.rounds * SMALL.confirmed
-    assert found.tests[0].family == 'modest' and found.tests[0].confirmed is not None
-    # what a broken family still promises counts by the share that was kept
-    assert all(test.kept < 0.1 and test.score < found.tests[0].score
-               for test in great if test.confirmed is None)
-
-
-def test_what_is_confirmed_counts_in_full_though_its_family_broke_promises() -> None:
-    design_of_test = TestDesign(Loads(1.6), Findings(HARD), effort=SMALL)
-    doubted = replace(design_of_test.run().tests[0], confirmed=None, kept=0.1)
-    [found] = design_of_test._compared([design_of_test._confirmed(doubted)])
-    assert found.confirmed is not None
-    assert found.score == pytest.approx(_compound(found, DEFAULT.planning.unlisted))
+    assert found.tests[0].family == family
+    # the limit leaves tests of both kinds
+    assert {test.family for test in found.tests} == {'modest', 'great'}
 
 
 def _compound(test: Candidate, unlisted: float) -> float:
-    assert test.confirmed is not None
-    told = test.confirmed.information(DEFAULT.planning.caution)
+    assert test.separation is not None
+    told = test.separation.information()
     return (1.0 - unlisted) * np.log(told) - unlisted * np.log(test.coarseness)
 
 
@@ -160,9 +147,8 @@ def test_other_effects_weigh_as_much_as_no_answer_is_likely() -> None:
     """A verdict leaves 0.6 to something without a name: its answers are worth 0.4."""
     doubted = [replace(rival, probability=0.4 * rival.probability) for rival in HARD]
     found = TestDesign(Loads(1.6), Findings(doubted), effort=SMALL).run()
-    confirmed = [test for test in found.tests if test.confirmed is not None]
-    assert confirmed
-    assert all(test.score == pytest.approx(_compound(test, 0.6)) for test in confirmed)
+    assert len(found.tests) > 1
+    assert all(test.score == pytest.approx(_compound(test, 0.6)) for test in found.tests)
 
 
 def test_where_no_load_within_the_limit_helps_the_limit_is_named() -> None:
@@ -216,23 +202,6 @@ def test_a_suspicion_is_looked_for_alone() -> None:
     assert found.tests[0].test == greatest
 
 
-def test_variants_are_of_the_tests_that_detect_most() -> None:
-    class Varied(Loads):
-        def __init__(self) -> None:
-            super().__init__(1.6)
-            self.varied: list[float] = []
-
-        def nearby(self, family: str, test: Any, random: np.random.Generator) -> Any:
-            self.varied.append(test)
-            return super().nearby(family, test, random)
-
-    space = Varied()
-    TestDesign(space, objective='detect', effort=SMALL).run()
-    assert len(space.varied) == SMALL.varied * SMALL.variants
-    # the stronger the load, the more shows
-    assert min(space.varied) >= 0.5
-
-
 class Heated(Loads):
     """The same loads, with heat or without: only heat shows how the lever expands."""
 
@@ -266,7 +235,7 @@ def test_of_tests_that_tell_the_rivals_apart_one_that_shows_more_is_proposed(see
     found = TestDesign(Heated(1.6), Findings(HARD), effort=SMALL, seed=seed).run()
     best, cold = found.tests[0], next(t for t in found.tests if not t.test[1])
     for test in (best, cold):
-        assert test.promised is not None and test.promised.expected() > 0.95
+        assert test.separation is not None and test.separation.expected() > 0.95
     assert best.test[1]
     # the expansion, one effect of four, counts as a thousand times too large in the cold
     assert cold.coarseness / best.coarseness == pytest.approx(1000.0 ** 0.25, rel=0.2)
