@@ -3,7 +3,7 @@
 """The design of the next test: which of the tests that a machine may run tells most."""
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from itertools import combinations
@@ -26,22 +26,18 @@ SEPARATE, SHARPEN, DETECT = 'separate', 'sharpen', 'detect'
 D_OPTIMAL, RANDOM = 'd-optimal', 'random'
 CRITERIA: Mapping[str, str] = {
     SEPARATE: 'T-optimality with prior probabilities: expected information between the rivals, '
-              'all tolerances free (Atkinson and Fedorov 1975; Ponce de Leon and Atkinson 1991); '
-              'weighted by how likely none of them is true, the rule of detect '
-              '(compound design: Atkinson, Donev and Tobias 2007, chapter 21)',
+              'all tolerances free; weighted by how likely none of them is true, the rule of '
+              'detect (compound design)',
     SHARPEN: "D_s-optimality: determinant of the covariance of the likeliest rival's effects, all "
-             'tolerances free (Atkinson, Donev and Tobias 2007, section 10.3)',
+             'tolerances free',
     DETECT: 'smallest size of each effect that shows beside all tolerances, in the tests so far '
             'or in this one, over that with the best test that was tried, in the geometric mean',
-    D_OPTIMAL: "D-optimality: determinant of the covariance of all the likeliest rival's numbers "
-               '(Kiefer and Wolfowitz 1959)',
+    D_OPTIMAL: "D-optimality: determinant of the covariance of all the likeliest rival's numbers",
     RANDOM: 'none: the first test within the limits'}
 # Less information than this does not count [nat].
 _NOTHING = 1e-6
 # An effect that does not show at any size is as bad as this many times the best.
 _NEVER = 1e3
-
-Progress = Callable[[float, str], None]
 
 
 def objective_for(findings: Findings) -> str:
@@ -53,9 +49,10 @@ def objective_for(findings: Findings) -> str:
 class DesignEffort:
     """How much is searched."""
 
-    drawn: int = 48  # tests, of all families in turn
-    judged: int = 24  # of those within the limits, the first
-    beyond: int = 6  # of the others, the first, where no test helps
+    drawn: int = 12  # tests of each family
+    judged: int = 12  # tests that are judged with all tolerances free
+    confirmed: int = 4  # of these, those to which rivals are fitted with fresh derivatives
+    beyond: int = 3  # tests beyond the limits that are judged if no other one helps
     margin: float = 0.9  # share of each limit that a test may use
 
 
@@ -63,8 +60,8 @@ class TestDesign:
     """
     The search for the next test, after the `findings` of the tests so far.
 
-    `objective` is one of `CRITERIA`. `suspected` has
-    ids of effects for `detect`, empty for all. `threads` tests are simulated at once.
+    `objective` is one of `CRITERIA`. `suspected` has ids of effects for `detect`, empty for all.
+    `threads` tests are simulated at once.
     """
 
     __test__ = False
@@ -78,33 +75,38 @@ class TestDesign:
         self._threads, self._effort = threads, effort
         self._random = np.random.default_rng(seed)
 
-    def run(self, progress: Progress = lambda share, doing: None) -> Proposal:
+    def run(self, progress: Callable[[float], None] = lambda share: None) -> Proposal:
         """Search; KeyError if the catalogue lacks an effect or a form of a rival."""
-        effort, families = self._effort, self._space.families
+        effort = self._effort
         drawn = [Candidate(family, self._space.draw(family, self._random), {})
-                 for _ in range(math.ceil(effort.drawn / len(families))) for family in families]
+                 for _ in range(effort.drawn) for family in self._space.families]
         judged: list[Candidate] = []
         beyond: Sequence[Candidate] = ()
         with one_blas_thread(), ThreadPoolExecutor(self._threads) as pool:
-            screened = []
-            for test in pool.map(self._screened, drawn):
-                progress(0.2 * len(screened) / len(drawn), 'tests within the limits')
-                screened.append(test)
-            allowed, refused = [], []
-            for test in screened:
-                (allowed if test.tightest[1] <= effort.margin else refused).append(test)
+            def each(do: Callable[[Candidate], Candidate], tests: Sequence[Candidate],
+                     first: float, last: float) -> Iterator[Candidate]:
+                for k, test in enumerate(pool.map(do, tests)):
+                    progress(first + (last - first) * k / len(tests))
+                    yield test
+
+            screened = list(each(self._screened, drawn, 0.0, 0.3))
+            allowed, refused = ([test for test in screened if (
+                test.tightest[1] <= effort.margin) == keeps] for keeps in (True, False))
             if self._objective == RANDOM:
                 helpful = [allowed[i] for i in self._random.permutation(len(allowed))[:1]]
             else:
-                chosen = allowed[:effort.judged]
-                for test in pool.map(self._judged, chosen):
-                    progress(0.2 + 0.8 * len(judged) / len(chosen), 'what each tells')
-                    judged.append(test)
-                judged = self._compared(judged)
+                judged = self._compared(each(
+                    self._judged, of_each_family(allowed, effort.judged), 0.3, 0.8))
+                if self._objective == SEPARATE:
+                    turns, count = of_each_family(judged, len(judged)), effort.confirmed
+                    judged = sorted(self._compared([
+                        *each(self._confirmed, turns[:count], 0.8, 1.0), *turns[count:]]),
+                        key=lambda test: test.promised is None)
                 helpful = [test for test in judged if _helps(test)]
                 if not helpful:
-                    beyond = self._compared(pool.map(self._judged, refused[:effort.beyond]))
-        progress(1.0, 'done')
+                    beyond = self._compared(pool.map(
+                        self._judged, of_each_family(refused, effort.beyond)))
+        progress(1.0)
         return Proposal(
             self._objective, CRITERIA[self._objective], self._rivals, helpful,
             Counter(test.tightest[0] for test in refused),
@@ -118,10 +120,14 @@ class TestDesign:
             machine.experiments, self._findings.noise))
 
     def _screened(self, test: Candidate) -> Candidate:
-        """Simulate a test with each rival; no rival's numbers follow."""
+        """Simulate a test with each rival; no rival's numbers follow yet."""
         machine = self._planned(test).low_fidelity()
         points = [known_to(machine, rival) for rival in self._rivals] or [{}]
-        return replace(test, use=self._space.use(machine, points))
+        test = replace(test, use=self._space.use(machine, points))
+        if self._objective != SEPARATE:
+            return test
+        rough = separation(machine, self._rivals, self._inflated, passes=0)
+        return replace(test, score=rough.information())
 
     def _judged(self, test: Candidate) -> Candidate:
         """Judge a test with all tolerances free."""
@@ -129,9 +135,14 @@ class TestDesign:
         if self._objective in (SHARPEN, D_OPTIMAL):
             return self._sharpened(test, machine)
         found = replace(test, sizes=self._sizes(machine))
-        if self._objective == DETECT:
-            return found
-        return replace(found, separation=separation(machine, self._rivals, self._inflated))
+        return found if self._objective == DETECT else replace(
+            found, separation=separation(machine, self._rivals, self._inflated, passes=1))
+
+    def _confirmed(self, test: Candidate) -> Candidate:
+        """Fit rivals on, with derivatives where they have got to."""
+        assert test.separation is not None
+        return replace(test, promised=test.separation.expected(), separation=separation(
+            with_process(self._planned(test)), self._rivals, self._inflated, passes=2))
 
     def _sharpened(self, test: Candidate, machine: Machine) -> Candidate:
         """Judge how well a test determines the numbers of the likeliest rival."""
@@ -213,3 +224,14 @@ def _helps(test: Candidate) -> bool:
     if test.deviations:
         return any(after < (1.0 - least) * before for before, after in test.deviations.values())
     return any(math.isfinite(size) for size, _ in test.sizes.values())
+
+
+def of_each_family(tests: Sequence[Candidate], most: int) -> list[Candidate]:
+    """Return the best tests of every family in turn: tests of a family break promises alike."""
+    best = sorted(tests, key=lambda test: -test.score)
+    places: Counter[str] = Counter()
+    rank = {}
+    for test in best:
+        rank[id(test)] = places[test.family]
+        places[test.family] += 1
+    return sorted(best, key=lambda test: rank[id(test)])[:most]

@@ -134,7 +134,7 @@ class Investigation:
             proposal = TestDesign(
                 space, findings, objective_for(findings), threads=self._threads,
                 seed=self._plan.seed + number).run(
-                    lambda share, doing: progress(f'design of test {number}', share))
+                    lambda share: progress(f'design of test {number}', share))
             found = as_data(proposal, space)
             test = proposal.tests[0].test if proposal.tests else None
         if test is not None:

@@ -59,7 +59,7 @@ def _told(test: Candidate, rivals: Sequence[Rival]) -> dict[str, Any]:
     if (told := test.separation) is not None:
         sure, after = DEFAULT.planning.sure, told.posterior()
         found['expected'] = {
-            'confirmed': True, 'promised': told.promise(),
+            'confirmed': test.promised is not None, 'promised': test.promised,
             'right_before': float(told.prior @ told.prior), 'right_after': told.expected(),
             'information_nat': told.information(),
             'surely': told.surely(sure), 'sure': sure,

@@ -4,10 +4,12 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy import linalg
 from simgap.fit.box_qp import box_constrained_step
+from simgap.fit.broyden import Jacobian
 from simgap.fit.cholesky import factored, ROUNDING, solved
 from simgap.fit.least_squares import LeastSquares
 from simgap.fit.noise import with_model_error
@@ -19,8 +21,8 @@ from simgap.settings import DEFAULT
 
 # A rival as good as impossible is no less probable than this.
 _LEAST = 1e-12
-# Gauss-Newton steps with which a rival follows the readings of another one.
-_STEPS = 8
+# Gauss-Newton steps with the same derivatives, and what is left of a step that gains nothing.
+_STEPS, _SHORTER = 8, 0.3
 
 
 @dataclass(frozen=True)
@@ -29,21 +31,18 @@ class Separation:
 
     prior: FloatArray  # probability of each rival before the test, shape (r,)
     lack: FloatArray  # half the chi-square by which j fits worse than i if i is true, shape (r, r)
-    promised: FloatArray  # the same to first order
     channels: Mapping[str, float]  # share of it that each signal gives
     points: Mapping[tuple[int, int], Point]  # where the fit of j to i ended, by (i, j)
 
     def posterior(self) -> FloatArray:
         """Return the probability of j if i is true, shape (r, r)."""
-        return _posterior(self.prior, self.lack)
+        logits = np.log(np.maximum(self.prior, _LEAST)) - self.lack
+        weights = np.exp(logits - logits.max(axis=1, keepdims=True))
+        return np.asarray(weights / weights.sum(axis=1, keepdims=True))
 
     def expected(self) -> float:
         """Return the probability that the true rival is expected to get, if one of them is."""
         return float(self.prior @ np.diag(self.posterior()))
-
-    def promise(self) -> float:
-        """Return the same to first order."""
-        return float(self.prior @ np.diag(_posterior(self.prior, self.promised)))
 
     def information(self) -> float:
         """Return the information on which rival is true that is expected, in nats."""
@@ -55,51 +54,43 @@ class Separation:
         return float(self.prior @ (np.diag(self.posterior()) >= sure))
 
 
-def _posterior(prior: FloatArray, lack: FloatArray) -> FloatArray:
-    logits = np.log(np.maximum(prior, _LEAST)) - lack
-    weights = np.exp(logits - logits.max(axis=1, keepdims=True))
-    return np.asarray(weights / weights.sum(axis=1, keepdims=True))
-
-
-def separation(machine: Machine, rivals: Sequence[Rival], inflated: float) -> Separation:
+def separation(machine: Machine, rivals: Sequence[Rival], inflated: float,
+               passes: int) -> Separation:
     """
     Return how well the planned tests of a machine would tell rivals apart.
 
-    Each rival is fitted to the readings of each other one. `inflated` divides differences of the
-    cost. Raises KeyError if the catalogue lacks an effect or a form.
+    Each rival is fitted to the readings of each other one, with fresh derivatives in each of the
+    `passes`; without any, numbers stay as they are. `inflated` divides differences of the cost.
+    Raises KeyError if the catalogue lacks an effect or a form.
     """
     likeliest = max(rivals, key=lambda rival: rival.probability)
     problem = _planned(machine, known_to(machine, likeliest))
-    readings = problem.residuals_at([known_to(machine, rival) for rival in rivals])
+    fits = [_Fit(problem, rival, inflated) for rival in rivals]
     prior = np.array([rival.probability for rival in rivals])
     prior = prior / prior.sum()
-    count, channels = len(rivals), problem.experiments[0].channels
-    promised, lack = np.zeros((2, count, count))
-    ends: dict[tuple[int, int], Point] = {}
+    lack, ends = np.zeros((len(rivals), len(rivals))), {}
+    channels = problem.experiments[0].channels
     power = np.zeros(len(channels))
-    for j, rival in enumerate(rivals):
-        fit = _Fit(problem, rival, inflated)
-        promised[:, j], lack[:, j], points, rest = fit.to(readings, j)
-        ends |= {(i, j): point for i, point in enumerate(points)}
-        power += prior @ np.sum(rest.reshape(count, -1, power.size) ** 2, axis=1)
+    for j, fit in enumerate(fits):
+        for i, true in enumerate(fits):
+            lack[i, j], ends[i, j], rest = fit.to(true, passes)
+            power += prior[i] * np.sum(rest.reshape(-1, power.size) ** 2, axis=0)
     # what a fit of the true rival leaves because it sticks is no evidence against the others
     lack = np.maximum(lack - np.diag(lack)[:, np.newaxis], 0.0)
     parts = power / max(float(power.sum()), _LEAST)
-    return Separation(prior, lack, promised, dict(zip(channels, parts.tolist(), strict=True)),
-                      ends)
+    return Separation(prior, lack, dict(zip(channels, parts.tolist(), strict=True)), ends)
 
 
 def deviations(machine: Machine, rival: Rival, inflated: float,
                ) -> tuple[tuple[str, ...], FloatArray, FloatArray]:
     """Return a rival's m names, and their covariances before and after tests, shape (m, m)."""
     fit = _Fit(_planned(machine, known_to(machine, rival)), rival, inflated)
-    names = [p.name for p in fit.numbers if p.name in rival.names]
-    places = [j for j, p in enumerate(fit.numbers) if p.name in rival.names]
-    scale = np.sqrt(np.diag(fit.hessian))
-    unit = np.outer(scale, scale)
-    inverse = solved(factored(fit.hessian / unit, ROUNDING), np.eye(scale.size)) / unit
+    names = [fit.numbers[j].name for j in fit.known]
+    hessian = fit.first[1]
+    unit = np.sqrt(np.outer(np.diag(hessian), np.diag(hessian)))
+    inverse = solved(factored(hessian / unit, ROUNDING), np.eye(len(unit))) / unit
     return (tuple(names), rival.covariance_of(names),
-            np.asarray(inflated * inverse[np.ix_(places, places)]))
+            np.asarray(inflated * inverse[np.ix_(fit.known, fit.known)]))
 
 
 def _planned(machine: Machine, point: Point) -> LeastSquares:
@@ -110,73 +101,74 @@ def _planned(machine: Machine, point: Point) -> LeastSquares:
 
 
 class _Fit:
-    """Fits of a rival, from its own numbers with what is known of them."""
+    """A rival that is fitted, from its own numbers and with what is known of them."""
 
     def __init__(self, problem: LeastSquares, rival: Rival, inflated: float) -> None:
-        self._problem, self._half = problem, 0.5 / inflated
+        self._problem, self._inflated = problem, inflated
         self.numbers = numbers_of(problem.machine, rival)
         own = known_to(problem.machine, rival)
         self._start = np.array([own.get(p.name, 0.0) for p in self.numbers])
-        self._residual = problem.residuals(self._point(self._start))
-        self._jacobian = problem.jacobian(self._point(self._start), self.numbers, self._residual,
-                                          central=False)
+        self._low, self._high = (np.array([getattr(p, side) for p in self.numbers]) - self._start
+                                 for side in ('low', 'high'))
+        self.known = [j for j, p in enumerate(self.numbers) if p.name in rival.names]
         self._precision = np.diag(proper_precision(self.numbers))
-        self._away = np.zeros(self._start.size)
-        places = [j for j, p in enumerate(self.numbers) if p.name in rival.names]
-        if places:
-            known = rival.covariance_of([self.numbers[j].name for j in places])
-            scale = np.sqrt(np.maximum(np.diag(known), 1e-30))
-            unit = np.outer(scale, scale)
-            # the digits of a file leave eigenvalues near zero of either sign: well known, not
-            # unknown
-            values, vectors = linalg.eigh(known / unit)
-            values = np.maximum(values, ROUNDING * values[-1])
-            # costs are divided by the inflation in the end, which the covariance holds already
-            self._precision[np.ix_(places, places)] = inflated * (
-                vectors / values @ vectors.T / unit)
-            # a standard deviation along each direction, to one side or the other
-            signs = np.random.default_rng(0).choice([-1.0, 1.0], len(places))
-            self._away[places] = scale * (vectors @ (np.sqrt(values) * signs))
-        self.hessian = (self._jacobian.T @ self._jacobian).astype(float) + self._precision
+        self._zero = np.zeros(self._start.size)
+        self._away = self._zero.copy()
+        self._residual = problem.residuals(self._point(self._zero))
+        if not self.known:
+            return
+        covariance = rival.covariance_of([self.numbers[j].name for j in self.known])
+        scale = np.sqrt(np.maximum(np.diag(covariance), 1e-30))
+        unit = np.outer(scale, scale)
+        # the digits of a file leave eigenvalues near zero of either sign: well known, not unknown
+        values, vectors = linalg.eigh(covariance / unit)
+        values = np.maximum(values, ROUNDING * values[-1])
+        # the costs are divided by the inflation in the end, which the covariance holds already
+        self._precision[np.ix_(self.known, self.known)] = inflated * (
+            vectors / values @ vectors.T / unit)
+        # a standard deviation along each direction, to one side or the other
+        signs = np.random.default_rng(0).choice([-1.0, 1.0], len(self.known))
+        self._away[self.known] = scale * (vectors @ (np.sqrt(values) * signs))
 
-    def _point(self, values: FloatArray) -> dict[str, float]:
-        return dict(zip((p.name for p in self.numbers), values.tolist(), strict=True))
+    @cached_property
+    def first(self) -> tuple[Jacobian, FloatArray]:
+        """Return the derivatives at its own numbers, see `_derivatives`."""
+        return self._derivatives(self._zero, self._residual)
 
-    def to(self, truths: FloatArray, own: int,
-           ) -> tuple[FloatArray, FloatArray, list[Point], FloatArray]:
+    def to(self, true: '_Fit', passes: int) -> tuple[float, Point, FloatArray]:
         """
-        Fit it to the readings of r rivals, of which `own` are its own, shape (r, n).
+        Return what its fit to the true rival leaves [half chi-square], where it ends, and the rest.
 
-        Returns what each fit leaves [half chi-square], to first order and in the end; where it
-        ended; and what is left of the readings. Its own are fitted from a little way off.
+        If that is itself, it begins a little way off.
         """
-        low, high = (np.array([getattr(p, side) for p in self.numbers]) - self._start
-                     for side in ('low', 'high'))
-        x = np.zeros((len(truths), self._start.size))
-        rest = self._residual - truths
-        step = self._steps(x, rest, low, high)
-        promised = self._cost(step, rest - step @ self._jacobian.T)
-        step[own] = self._away
-        cost, length = np.full(len(truths), np.inf), 1.0
+        x, here, truth = self._zero, self._residual, true._residual
+        if true is self and passes:
+            x = np.clip(self._away, self._low, self._high)
+            here = self._problem.residuals(self._point(x))
+        rest = here - truth
         cost = self._cost(x, rest)
-        cost[own] = np.inf
-        length = np.ones((len(truths), 1))
-        for _ in range(_STEPS):
-            trial = np.clip(x + length * step, low, high)
-            left = self._problem.residuals_at([
-                self._point(self._start + row) for row in trial]) - truths
-            after = self._cost(trial, left)
-            gained = after < cost
-            x[gained], rest[gained], cost[gained] = trial[gained], left[gained], after[gained]
-            length = np.where(gained[:, np.newaxis], 1.0, 0.3 * length)
-            step = self._steps(x, rest, low, high)
-        return promised, cost, [self._point(self._start + row) for row in x], rest
+        for k in range(passes):
+            jacobian, hessian = self._derivatives(x, rest + truth) if k else self.first
+            length = 1.0
+            for _ in range(_STEPS):
+                slope = (rest.astype(np.float32) @ jacobian).astype(float) - self._precision @ x
+                step = box_constrained_step(hessian, slope, self._low - x, self._high - x)
+                ahead = np.clip(x + length * step, self._low, self._high)
+                left = self._problem.residuals(self._point(ahead)) - truth
+                after = self._cost(ahead, left)
+                gained = after < cost
+                length = 1.0 if gained else _SHORTER * length
+                if gained:
+                    x, rest, cost = ahead, left, after
+        return cost, self._point(x), rest
 
-    def _steps(self, x: FloatArray, rest: FloatArray, low: FloatArray,
-               high: FloatArray) -> FloatArray:
-        slopes = (rest.astype(np.float32) @ self._jacobian).astype(float) - x @ self._precision
-        return np.array([box_constrained_step(self.hessian, slope, low - at, high - at)
-                         for slope, at in zip(slopes, x, strict=True)])
+    def _derivatives(self, x: FloatArray, residual: FloatArray) -> tuple[Jacobian, FloatArray]:
+        """Return the Jacobian at a point, and the Hessian with what is known."""
+        jacobian = self._problem.jacobian(self._point(x), self.numbers, residual, central=False)
+        return jacobian, np.asarray((jacobian.T @ jacobian).astype(float) + self._precision)
 
-    def _cost(self, x: FloatArray, rest: FloatArray) -> FloatArray:
-        return self._half * (np.sum(rest ** 2, axis=1) + np.sum((x @ self._precision) * x, axis=1))
+    def _point(self, x: FloatArray) -> dict[str, float]:
+        return dict(zip((p.name for p in self.numbers), (self._start + x).tolist(), strict=True))
+
+    def _cost(self, x: FloatArray, rest: FloatArray) -> float:
+        return 0.5 * float(rest @ rest + x @ self._precision @ x) / self._inflated
