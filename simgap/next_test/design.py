@@ -51,7 +51,6 @@ class DesignEffort:
 
     drawn: int = 12  # tests of each family
     judged: int = 12  # tests that are judged with all tolerances free
-    confirmed: int = 4  # of these, those to which rivals are fitted with fresh derivatives
     beyond: int = 3  # tests beyond the limits that are judged if no other one helps
     margin: float = 0.9  # share of each limit that a test may use
 
@@ -96,12 +95,7 @@ class TestDesign:
                 helpful = [allowed[i] for i in self._random.permutation(len(allowed))[:1]]
             else:
                 judged = self._compared(each(
-                    self._judged, of_each_family(allowed, effort.judged), 0.3, 0.8))
-                if self._objective == SEPARATE:
-                    turns, count = of_each_family(judged, len(judged)), effort.confirmed
-                    judged = sorted(self._compared([
-                        *each(self._confirmed, turns[:count], 0.8, 1.0), *turns[count:]]),
-                        key=lambda test: test.promised is None)
+                    self._judged, of_each_family(allowed, effort.judged), 0.3, 1.0))
                 helpful = [test for test in judged if _helps(test)]
                 if not helpful:
                     beyond = self._compared(pool.map(
@@ -126,7 +120,7 @@ class TestDesign:
         test = replace(test, use=self._space.use(machine, points))
         if self._objective != SEPARATE:
             return test
-        rough = separation(machine, self._rivals, self._inflated, passes=0)
+        rough = separation(machine, self._rivals, self._inflated, fitted=False)
         return replace(test, score=rough.information())
 
     def _judged(self, test: Candidate) -> Candidate:
@@ -136,13 +130,7 @@ class TestDesign:
             return self._sharpened(test, machine)
         found = replace(test, sizes=self._sizes(machine))
         return found if self._objective == DETECT else replace(
-            found, separation=separation(machine, self._rivals, self._inflated, passes=1))
-
-    def _confirmed(self, test: Candidate) -> Candidate:
-        """Fit rivals on, with derivatives where they have got to."""
-        assert test.separation is not None
-        return replace(test, promised=test.separation.expected(), separation=separation(
-            with_process(self._planned(test)), self._rivals, self._inflated, passes=2))
+            found, separation=separation(machine, self._rivals, self._inflated))
 
     def _sharpened(self, test: Candidate, machine: Machine) -> Candidate:
         """Judge how well a test determines the numbers of the likeliest rival."""
@@ -178,8 +166,14 @@ class TestDesign:
             seen = np.isfinite(sizes).any(axis=0)
             sizes, weights = sizes[:, seen], self._weights(found[0])[seen]
             over = np.log(np.minimum(sizes / sizes.min(axis=0, initial=math.inf), _NEVER))
-            found = [self._scored(test, coarseness) for test, coarseness in zip(
-                found, over @ weights / max(weights.sum(), 1e-30), strict=True)]
+            coarse = over @ weights / max(weights.sum(), 1e-30)
+            # each part of a score is the logarithm of an efficiency, but for what all tests share
+            told = [test.separation.information() if test.separation else 1.0 for test in found]
+            unlisted = 1.0 if self._objective == DETECT else max(
+                DEFAULT.planning.unlisted, self._findings.unlisted)
+            scores = (1.0 - unlisted) * np.log(np.maximum(told, _NOTHING)) - unlisted * coarse
+            found = [replace(test, score=float(score), coarseness=math.exp(times))
+                     for test, score, times in zip(found, scores, coarse, strict=True)]
         return sorted(found, key=lambda test: -test.score)
 
     def _weights(self, test: Candidate) -> FloatArray:
@@ -189,16 +183,6 @@ class TestDesign:
         shares = {part: share for part, share in self._findings.unnamed.items() if part in parts}
         rest = (1.0 - sum(shares.values())) / max(len(parts), 1)
         return np.array([rest + shares.get(part, 0.0) / parts.count(part) for part in parts])
-
-    def _scored(self, test: Candidate, coarseness: float) -> Candidate:
-        """Return a test with what it tells of the rivals and of other effects, by their weights."""
-        # Each part is the logarithm of an efficiency, but for what all tests share.
-        score = -coarseness
-        if test.separation is not None:
-            unlisted = max(DEFAULT.planning.unlisted, self._findings.unlisted)
-            information = max(test.separation.information(), _NOTHING)
-            score = (1.0 - unlisted) * math.log(information) - unlisted * coarseness
-        return replace(test, score=score, coarseness=math.exp(coarseness))
 
     def _alike(self, judged: Sequence[Candidate]) -> list[tuple[int, int, Mapping[str, float]]]:
         """Return the rivals that no test tells apart, and what would."""
@@ -227,7 +211,7 @@ def _helps(test: Candidate) -> bool:
 
 
 def of_each_family(tests: Sequence[Candidate], most: int) -> list[Candidate]:
-    """Return the best tests of every family in turn: tests of a family break promises alike."""
+    """Return the best tests of every family in turn: rough scores compare no families."""
     best = sorted(tests, key=lambda test: -test.score)
     places: Counter[str] = Counter()
     rank = {}

@@ -5,9 +5,11 @@
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 import json
 import os
 from pathlib import Path
+import shutil
 from tempfile import TemporaryDirectory
 from typing import Any
 
@@ -79,7 +81,7 @@ class Investigation:
         # more tests may be allowed later
         asked = {'until': plan.until, 'duration_s': plan.duration, 'seed': plan.seed,
                  'limits': bench.limits}
-        known = self._read('investigation') or self._written('investigation', asked)
+        known = self._once('investigation', lambda: asked)
         if differing := [key for key in asked if known.get(key) != asked[key]]:
             raise UserError(f'{folder}: holds an investigation with other settings '
                             f'({", ".join(differing)}); give the same ones to go on, or another '
@@ -93,21 +95,27 @@ class Investigation:
         answers after it, and `ended`: why there are no more.
         """
         tests: list[dict[str, Any]] = []
-        ended = NO_MORE
+        ended, findings = NO_MORE, Findings()
         for number in range(1, self._plan.most + 1):
-            proposal = self._proposal(number, progress)
+            proposal = self._once(f'proposal_{number}', partial(
+                self._designed, number, findings, progress))
             if proposal['test'] is None:
                 ended = NOTHING_HELPS
                 break
             self._record(number, progress)
-            tests.append(_chapter(number, proposal, self._verdict(number, progress)))
-            self._written('story', {'tests': tests, 'ended': None})
+            verdict = self._once(f'verdict_{number}', partial(
+                self._diagnosed, number, findings.rivals, progress))
+            findings = Findings.of_data(verdict['planning'])
+            tests.append(_chapter(number, proposal, verdict))
+            self._write('story', {'tests': tests, 'ended': None})
             if self._is_sure(tests):
                 named = tests[-1]['answers'][0]['effects']
                 ended = NOTHING_KNOWN if named == _UNKNOWN else DECIDED
                 break
-        return self._written('story', {'tests': tests, 'ended': ended, 'seconds_of_testing':
-                                       self._plan.duration * len(tests)})
+        story = {'tests': tests, 'ended': ended,
+                 'seconds_of_testing': self._plan.duration * len(tests)}
+        self._write('story', story)
+        return story
 
     def _is_sure(self, tests: Sequence[Mapping[str, Any]]) -> bool:
         """Return whether the last verdict is sure of what the verdict before also named."""
@@ -116,82 +124,68 @@ class Investigation:
         before, last = (test['answers'][0] for test in tests[-2:])
         # no verdict gives 'unknown' more
         most = DEFAULT.verdict.most_unknown if last['effects'] == _UNKNOWN else 1.0
-        return (last['probability'] >= most * self._plan.until
-                and last['effects'] == before['effects'])
+        return bool(last['probability'] >= most * self._plan.until
+                    and last['effects'] == before['effects'])
 
-    def _proposal(self, number: int, progress: Progress) -> dict[str, Any]:
-        """Return the proposal of a test; the first one detects, the others separate."""
-        name, space = f'proposal_{number}', self._bench.space
-        played = self._played(number)
-        found = self._read(name)
-        if found and (found['test'] is None or played.exists()):
-            return found
-        if number == 1 and self._first is not None:
-            found, test = {'objective': 'given', 'family': 'given',
-                           'test': space.as_data(self._first)}, self._first
-        else:
-            findings = self._findings(number - 1)
+    def _designed(self, number: int, findings: Findings, progress: Progress) -> dict[str, Any]:
+        """Save a test, and return its proposal; the first one detects, the others separate."""
+        space, test = self._bench.space, self._first
+        if number > 1 or test is None:
             proposal = TestDesign(
                 space, findings, objective_for(findings), threads=self._threads,
-                seed=self._plan.seed + number).run(
-                    lambda share: progress(f'design of test {number}', share))
+                seed=self._plan.seed + number).run(partial(progress, f'design of test {number}'))
             found = as_data(proposal, space)
             test = proposal.tests[0].test if proposal.tests else None
+        else:
+            found = {'objective': 'given', 'family': 'given', 'test': space.as_data(test)}
         if test is not None:
-            self._bench.save(test, played)
-        return self._written(name, found)
+            self._bench.save(test, self._played(number))
+        return found
 
     def _played(self, number: int) -> Path:
         return self._folder / self._bench.played.format(number=number)
 
-    def _findings(self, number: int) -> Findings:
-        """Return what the verdict after a test says; nothing before the first one."""
-        verdict = self._read(f'verdict_{number}')
-        return Findings.of_data(verdict['planning']) if verdict else Findings()
-
     def _record(self, number: int, progress: Progress) -> None:
         """Run a test; the recording gets its name once it is whole."""
-        if self._recording(number) is not None:
+        if f'test_{number}' in self._recordings(number):
             return
         progress(f'test {number}', 0.0)
+        for old in self._folder.glob('.test_*'):
+            shutil.rmtree(old, ignore_errors=True)
         with TemporaryDirectory(prefix='.test_', dir=self._folder) as drafts:
             draft = Path(drafts) / 'draft'
             self._bench.run(number, self._played(number), self._plan.duration, draft)
             os.replace(draft, self._folder / f'test_{number}{"" if draft.is_dir() else ".csv"}')
 
-    def _recording(self, number: int) -> Path | None:
-        return next((path for suffix in ('', '.csv')
-                     if (path := self._folder / f'test_{number}{suffix}').exists()), None)
+    def _recordings(self, number: int) -> dict[str, Path]:
+        """Return the recordings that are there up to a test, by name."""
+        return {f'test_{k}': path for k in range(1, number + 1) for suffix in ('', '.csv')
+                if (path := self._folder / f'test_{k}{suffix}').exists()}
 
-    def _verdict(self, number: int, progress: Progress) -> dict[str, Any]:
+    def _diagnosed(self, number: int, earlier: Sequence[Rival],
+                   progress: Progress) -> dict[str, Any]:
         """Return the verdict on all recordings up to a test."""
-        name = f'verdict_{number}'
-        if found := self._read(name):
-            return found
-        recorded = {f'test_{k}': path for k in range(1, number + 1)
-                    if (path := self._recording(k)) is not None}
-        return self._written(name, self._bench.diagnose(
-            recorded, lambda share, doing: progress(f'diagnosis after test {number}', share),
-            self._findings(number - 1).rivals).as_data())
+        return self._bench.diagnose(
+            self._recordings(number),
+            lambda share, doing: progress(f'diagnosis after test {number}', share),
+            earlier).as_data()
 
-    def _read(self, name: str) -> dict[str, Any] | None:
+    def _once(self, name: str, make: Callable[[], Mapping[str, Any]]) -> dict[str, Any]:
+        """Return the plain data of a file in the folder, which is made if it is not there."""
         path = self._folder / f'{name}.json'
+        if not path.exists():
+            self._write(name, make())
         try:
             found: dict[str, Any] = json.loads(path.read_text(encoding='utf-8'))
-        except FileNotFoundError:
-            return None
         except ValueError as error:
             raise UserError(
                 f'{path}: no JSON ({error}); remove it to have it made anew') from error
         return found
 
-    def _written(self, name: str, data: Mapping[str, Any]) -> dict[str, Any]:
-        """Write plain data whole or not at all; return them as they are read."""
-        text = json.dumps(data, indent=2, default=float)
+    def _write(self, name: str, data: Mapping[str, Any]) -> None:
+        """Write plain data whole or not at all."""
         with drafted(self._folder / f'{name}.json') as stream:
-            stream.write(text.encode())
-        found: dict[str, Any] = json.loads(text)
-        return found
+            stream.write(json.dumps(data, indent=2, default=float).encode())
 
 
 def _chapter(number: int, proposal: Mapping[str, Any],

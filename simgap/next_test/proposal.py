@@ -59,9 +59,8 @@ def _told(test: Candidate, rivals: Sequence[Rival]) -> dict[str, Any]:
     if (told := test.separation) is not None:
         sure, after = DEFAULT.planning.sure, told.posterior()
         found['expected'] = {
-            'confirmed': test.promised is not None, 'promised': test.promised,
-            'right_before': float(told.prior @ told.prior), 'right_after': told.expected(),
-            'information_nat': told.information(),
+            'confirmed': True, 'right_before': float(told.prior @ told.prior),
+            'right_after': told.expected(), 'information_nat': told.information(),
             'surely': told.surely(sure), 'sure': sure,
             'each': [{'effects': list(rival.named) or ['none'], 'before': float(told.prior[i]),
                       'after_if_true': float(after[i, i]), 'after': after[i].tolist()}

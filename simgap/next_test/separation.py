@@ -21,8 +21,8 @@ from simgap.settings import DEFAULT
 
 # A rival as good as impossible is no less probable than this.
 _LEAST = 1e-12
-# Gauss-Newton steps with the same derivatives, and what is left of a step that gains nothing.
-_STEPS, _SHORTER = 8, 0.3
+# Gauss-Newton steps, how often derivatives are taken, and what is left of a step that gains nothing.
+_STEPS, _PASSES, _SHORTER = 8, 2, 0.3
 
 
 @dataclass(frozen=True)
@@ -55,13 +55,13 @@ class Separation:
 
 
 def separation(machine: Machine, rivals: Sequence[Rival], inflated: float,
-               passes: int) -> Separation:
+               fitted: bool = True) -> Separation:
     """
     Return how well the planned tests of a machine would tell rivals apart.
 
-    Each rival is fitted to the readings of each other one, with fresh derivatives in each of the
-    `passes`; without any, numbers stay as they are. `inflated` divides differences of the cost.
-    Raises KeyError if the catalogue lacks an effect or a form.
+    Each rival is fitted to the readings of each other one; if not, its numbers stay as they are.
+    `inflated` divides differences of the cost. Raises KeyError if the catalogue lacks an effect or
+    a form.
     """
     likeliest = max(rivals, key=lambda rival: rival.probability)
     problem = _planned(machine, known_to(machine, likeliest))
@@ -73,7 +73,7 @@ def separation(machine: Machine, rivals: Sequence[Rival], inflated: float,
     power = np.zeros(len(channels))
     for j, fit in enumerate(fits):
         for i, true in enumerate(fits):
-            lack[i, j], ends[i, j], rest = fit.to(true, passes)
+            lack[i, j], ends[i, j], rest = fit.to(true, fitted)
             power += prior[i] * np.sum(rest.reshape(-1, power.size) ** 2, axis=0)
     # what a fit of the true rival leaves because it sticks is no evidence against the others
     lack = np.maximum(lack - np.diag(lack)[:, np.newaxis], 0.0)
@@ -135,19 +135,19 @@ class _Fit:
         """Return the derivatives at its own numbers, see `_derivatives`."""
         return self._derivatives(self._zero, self._residual)
 
-    def to(self, true: '_Fit', passes: int) -> tuple[float, Point, FloatArray]:
+    def to(self, true: '_Fit', fitted: bool) -> tuple[float, Point, FloatArray]:
         """
         Return what its fit to the true rival leaves [half chi-square], where it ends, and the rest.
 
         If that is itself, it begins a little way off.
         """
         x, here, truth = self._zero, self._residual, true._residual
-        if true is self and passes:
+        if true is self and fitted:
             x = np.clip(self._away, self._low, self._high)
             here = self._problem.residuals(self._point(x))
         rest = here - truth
         cost = self._cost(x, rest)
-        for k in range(passes):
+        for k in range(_PASSES if fitted else 0):
             jacobian, hessian = self._derivatives(x, rest + truth) if k else self.first
             length = 1.0
             for _ in range(_STEPS):

@@ -23,7 +23,7 @@ from simgap.next_test.space import TestSpace
 from simgap.search.rival import Rival
 from simgap.settings import DEFAULT
 
-SMALL = DesignEffort(drawn=8, judged=6, confirmed=2)
+SMALL = DesignEffort(drawn=8, judged=6)
 
 
 class Lever(Machine):
@@ -126,12 +126,12 @@ class Promising(Loads):
 @pytest.mark.parametrize('kept, family', [(1.0, 'great'), (1e-3, 'modest')])
 def test_where_a_family_breaks_its_promises_another_one_is_proposed(
         kept: float, family: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    def fitted(machine: Lever, *rest: Any, passes: int) -> Separation:
-        told = separation(machine, *rest, passes=passes)
-        broken = passes == 2 and machine.load > 1.0
-        return replace(told, lack=kept * told.lack) if broken else told
+    def broken(machine: Lever, *rest: Any, fitted: bool = True) -> Separation:
+        told = separation(machine, *rest, fitted=fitted)
+        share = kept if fitted and machine.load > 1.0 else 1.0
+        return replace(told, lack=share * told.lack)
 
-    monkeypatch.setattr(design, 'separation', fitted)
+    monkeypatch.setattr(design, 'separation', broken)
     found = TestDesign(Promising(2.0), Findings(HARD), effort=SMALL).run()
     assert found.tests[0].family == family
 

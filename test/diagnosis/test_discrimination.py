@@ -55,7 +55,7 @@ READINGS = 1000
 def lack_at(x: FloatArray, sigma: float = 0.05) -> float:
     """Return the mean square by which the best parabola misses the true curve."""
     told = separation(Curves(x, sigma), [rival('waves', TRUE, 1e-6),
-                                         rival('parabola', (0.0, 0.0, 0.0), 100.0)], 1.0, 1)
+                                         rival('parabola', (0.0, 0.0, 0.0), 100.0)], 1.0)
     return float(told.lack[0, 1]) * 2.0 * sigma ** 2 / x.size
 
 
@@ -80,10 +80,10 @@ def test_two_constants_are_told_apart_as_the_prior_of_one_allows() -> None:
     machine = Curves(np.zeros(n), s)
     # at x = 0 only the first number of the parabola counts
     rivals = [rival('waves', (a, 0.0, 0.0), 1e-6), rival('parabola', (b, 0.0, 0.0), math.sqrt(v))]
-    found = separation(machine, rivals, f, 1)
+    found = separation(machine, rivals, f)
     assert found.lack[0, 1] == pytest.approx((a - b) ** 2 / 2.0 / (v + f * s ** 2 / n), rel=1e-3)
     assert found.lack[0, 0] == found.lack[1, 1] == 0.0
-    still = separation(machine, rivals, f, passes=0)
+    still = separation(machine, rivals, f, fitted=False)
     assert still.lack[0, 1] == pytest.approx((a - b) ** 2 * n / s ** 2 / 2.0 / f)
 
 
@@ -98,9 +98,8 @@ def test_fits_of_linear_curves_end_where_the_projection_says() -> None:
     v, noise = 0.2 ** 2, 1.6 * 0.5 ** 2
     step = np.linalg.solve(powers.T @ powers + noise / v * np.eye(3), powers.T @ d)
     lack = 0.5 * (np.sum((d - powers @ step) ** 2) / noise + step @ step / v)
-    for passes in (1, 2):
-        found = separation(machine, rivals, 1.6, passes)
-        assert found.lack[0, 1] == pytest.approx(lack, rel=2e-3)
+    found = separation(machine, rivals, 1.6)
+    assert found.lack[0, 1] == pytest.approx(lack, rel=2e-3)
     assert found.points[0, 1].keys() == {f'parabola_{k}' for k in range(3)}
 
 
@@ -124,7 +123,7 @@ def lack_of_silence(deviation: float, order: int = 1) -> float:
     tone = Rival(('part.tone',), ('part.tone',), ('',), 0.5, ('frequency',), np.array([1.0]),
                  np.array([[deviation ** 2]]))
     silence = Rival((), (), (), 0.5, (), np.zeros(0), np.zeros((0, 0)))
-    lack = separation(Tone(), [tone, silence][::order], 1.0, 2).lack[::order, ::order]
+    lack = separation(Tone(), [tone, silence][::order], 1.0).lack[::order, ::order]
     return float(lack[0, 1])
 
 
@@ -153,7 +152,7 @@ def test_probabilities_after_a_test() -> None:
 def test_the_signals_that_tell_have_their_shares() -> None:
     x = np.linspace(-1.0, 1.0, 100)
     found = separation(Curves(x, 0.1), [rival('waves', TRUE, 0.1),
-                                        rival('parabola', (1.0, 0.0, -1.8), 0.1)], 1.0, 1)
+                                        rival('parabola', (1.0, 0.0, -1.8), 0.1)], 1.0)
     assert found.channels == {'y': 1.0}
 
 
@@ -179,7 +178,7 @@ def test_the_digits_of_a_file_free_no_direction_and_hold_none(seed: int) -> None
                        covariance=np.outer(free, free) + 1e-9 * np.eye(3))
     machine = Curves(x, s)
     waves = rival('waves', TRUE, 1e-6)
-    found = separation(machine, [waves, Rival.of_data(parabola.as_data())], 1.0, 1)
+    found = separation(machine, [waves, Rival.of_data(parabola.as_data())], 1.0)
     powers = np.column_stack([np.ones_like(x), x, x ** 2])
     d = machine.predict(waves.point, 0)[:, 0] - powers @ centre
     c = powers @ free

@@ -82,7 +82,7 @@ def test_an_answer_that_is_as_good_as_impossible_is_no_rival() -> None:
 
 def test_a_more_precise_test_tells_them_apart() -> None:
     rivals = answers_of(Gauge(0.024, sigma=0.03))
-    coarse, fine = (separation(Gauge(0.0, sigma), rivals, 1.0, 1).information()
+    coarse, fine = (separation(Gauge(0.0, sigma), rivals, 1.0).information()
                     for sigma in (0.3, 0.003))
     assert fine > 0.1
     assert fine > 3.0 * coarse
