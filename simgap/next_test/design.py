@@ -50,7 +50,8 @@ class DesignEffort:
     """How much is searched."""
 
     drawn: int = 12  # tests of each family
-    judged: int = 12  # tests that are judged with all tolerances free
+    judged: int = 24  # tests that are judged with all tolerances free
+    fitted: int = 12  # the same where rivals are fitted, after a rough look at all
     beyond: int = 3  # tests beyond the limits that are judged if no other one helps
     margin: float = 0.9  # share of each limit that a test may use
 
@@ -94,8 +95,9 @@ class TestDesign:
             if self._objective == RANDOM:
                 helpful = [allowed[i] for i in self._random.permutation(len(allowed))[:1]]
             else:
+                most = effort.fitted if self._objective == SEPARATE else effort.judged
                 judged = self._compared(each(
-                    self._judged, of_each_family(allowed, effort.judged), 0.3, 1.0))
+                    self._judged, of_each_family(allowed, most), 0.3, 1.0))
                 helpful = [test for test in judged if _helps(test)]
                 if not helpful:
                     beyond = self._compared(pool.map(
@@ -186,7 +188,7 @@ class TestDesign:
 
     def _alike(self, judged: Sequence[Candidate]) -> list[tuple[int, int, Mapping[str, float]]]:
         """Return the rivals that no test tells apart, and what would."""
-        found = []
+        found: list[tuple[int, int, Mapping[str, float]]] = []
         for i, j in combinations(range(len(self._rivals)), 2):
             lacks = [min(told.lack[i, j], told.lack[j, i]) for test in judged
                      if (told := test.separation) is not None]

@@ -21,7 +21,7 @@ from simgap.settings import DEFAULT
 
 # A rival as good as impossible is no less probable than this.
 _LEAST = 1e-12
-# Gauss-Newton steps, how often derivatives are taken, and what is left of a step that gains nothing.
+# Gauss-Newton steps, passes with derivatives of their own, what is left of a step without gain.
 _STEPS, _PASSES, _SHORTER = 8, 2, 0.3
 
 
@@ -137,7 +137,7 @@ class _Fit:
 
     def to(self, true: '_Fit', fitted: bool) -> tuple[float, Point, FloatArray]:
         """
-        Return what its fit to the true rival leaves [half chi-square], where it ends, and the rest.
+        Return what its fit to the true rival leaves [half chi-square], where it ends, the rest.
 
         If that is itself, it begins a little way off.
         """

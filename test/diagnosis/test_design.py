@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import replace
 import json
 from typing import Any
@@ -12,7 +13,9 @@ from typing import Any
 from blas_threads import during, Look
 import numpy as np
 import pytest
-from simgap.machine.contract import Effect, Experiment, FloatArray, Form, Machine, Parameter, Point
+from simgap.machine.contract import (
+    Course, DisturbanceInput, Effect, Experiment, FloatArray, Form, Machine, Parameter, Point,
+)
 from simgap.next_test import design
 from simgap.next_test.candidate import Candidate
 from simgap.next_test.design import CRITERIA, DesignEffort, TestDesign
@@ -21,9 +24,8 @@ from simgap.next_test.rivals import Findings
 from simgap.next_test.separation import Separation, separation
 from simgap.next_test.space import TestSpace
 from simgap.search.rival import Rival
-from simgap.settings import DEFAULT
 
-SMALL = DesignEffort(drawn=8, judged=6)
+SMALL = DesignEffort(drawn=8, judged=6, fitted=6)
 
 
 class Lever(Machine):
@@ -316,3 +318,46 @@ def test_linear_algebra_has_one_thread_because_tests_are_judged_side_by_side() -
 
     assert during(lambda look: TestDesign(
         Watched(look), Findings(HARD), effort=SMALL).run()) == {1}
+
+
+class Windy(Lever):
+    """The lever in the wind of every day, with a coarse twin that knows none."""
+
+    def __init__(self, load: float, seen: list[str], wind: float) -> None:
+        super().__init__(load)
+        self.disturbance_inputs = (
+            DisturbanceInput('wind', 'lever', everyday=wind, everyday_s=0.1),)
+        self._seen = seen
+        self._coarse: Machine = copy(self)
+
+    def low_fidelity(self) -> Machine:
+        return getattr(self, '_coarse', self)
+
+    def simulate_disturbed(self, point: Point, place: DisturbanceInput,
+                           course: Course) -> list[FloatArray]:
+        self._seen.append(place.name)
+        return [self.predict(point, 0) + course(self.experiments[0].time)[:, np.newaxis]]
+
+
+def test_a_test_is_judged_in_the_wind_of_every_day_which_is_simulated_once() -> None:
+    class Outdoors(Loads):
+        def __init__(self, wind: float) -> None:
+            super().__init__(1.6)
+            self.seen: list[str] = []
+            self.wind = wind
+
+        def machine(self, test: Any) -> Lever:
+            return Windy(test, self.seen, self.wind)
+
+    def found(wind: float) -> tuple[Candidate, int]:
+        space = Outdoors(wind)
+        test = TestDesign(space, Findings(HARD), effort=SMALL).run().tests[0]
+        return test, len(space.seen)
+
+    (calm, none), (windy, runs) = found(0.0), found(0.3)
+    scales = Windy(1.0, [], 0.3).time_scales
+    shifts = np.arange(0.0, scales.response_s - 0.5 * scales.pulse_s, scales.pulse_s).size
+    assert (none, runs) == (0, SMALL.fitted * shifts)
+    assert calm.separation is not None and windy.separation is not None
+    assert windy.separation.lack[0, 1] < 0.5 * calm.separation.lack[0, 1]
+    assert all(windy.sizes[name][0] > 1.5 * size for name, (size, _) in calm.sizes.items())

@@ -20,7 +20,7 @@ from simgap.next_test.investigation import DECIDED, InvestigationPlan
 from simgap.next_test.rivals import Findings
 from simgap.search.rival import Rival
 
-SMALL = DesignEffort(drawn=6, judged=4)
+SMALL = DesignEffort(drawn=6, judged=4, fitted=4)
 
 
 def push_off(duration_s: float, random: np.random.Generator) -> Log:
