@@ -17,7 +17,7 @@ from simgap.machine.pulses import with_process
 from simgap.next_test.candidate import Candidate, Proposal
 from simgap.next_test.confusability import confusability
 from simgap.next_test.rivals import Findings, known_to
-from simgap.next_test.separation import deviations, separation
+from simgap.next_test.separation import separation, sharpening
 from simgap.next_test.space import TestSpace
 from simgap.settings import DEFAULT
 
@@ -129,24 +129,13 @@ class TestDesign:
         """Judge a test with all tolerances free."""
         machine = with_process(self._planned(test))
         if self._objective in (SHARPEN, D_OPTIMAL):
-            return self._sharpened(test, machine)
-        found = replace(test, sizes=self._sizes(machine))
-        return found if self._objective == DETECT else replace(
-            found, separation=separation(machine, self._rivals, self._inflated))
-
-    def _sharpened(self, test: Candidate, machine: Machine) -> Candidate:
-        """Judge how well a test determines the numbers of the likeliest rival."""
-        rival = max(self._rivals, key=lambda item: item.probability)
-        names, before, after = deviations(machine, rival, self._inflated)
-        own = {p.name for form in rival.forms_of(machine) for p in form.parameters}
-        wanted = [j for j, name in enumerate(names) if name in own]
-        if self._objective == D_OPTIMAL or not wanted:
-            wanted = list(range(len(names)))
-        block = np.ix_(wanted, wanted)
-        score = 0.5 * (np.linalg.slogdet(before[block])[1] - np.linalg.slogdet(after[block])[1])
-        return replace(test, score=float(score), deviations={
-            names[j]: (math.sqrt(before[j, j]), math.sqrt(max(after[j, j], 0.0)))
-            for j in wanted})
+            score, found = sharpening(
+                machine, max(self._rivals, key=lambda rival: rival.probability), self._inflated,
+                every=self._objective == D_OPTIMAL)
+            return replace(test, score=score, deviations=found)
+        test = replace(test, sizes=self._sizes(machine))
+        return test if self._objective == DETECT else replace(
+            test, separation=separation(machine, self._rivals, self._inflated))
 
     def _sizes(self, machine: Machine) -> dict[str, tuple[float, str]]:
         """Return from which size each effect shows; to detect, in the tests so far as well."""

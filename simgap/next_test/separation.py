@@ -21,8 +21,9 @@ from simgap.settings import DEFAULT
 
 # A rival as good as impossible is no less probable than this.
 _LEAST = 1e-12
-# Gauss-Newton steps, passes with derivatives of their own, what is left of a step without gain.
-_STEPS, _PASSES, _SHORTER = 8, 2, 0.3
+# Gauss-Newton steps, passes with derivatives of their own, what is left of a step without gain, and
+# the gain of a step that is the last one [half chi-square].
+_STEPS, _PASSES, _SHORTER, _SETTLED = 8, 2, 0.3, 0.01
 
 
 @dataclass(frozen=True)
@@ -81,16 +82,26 @@ def separation(machine: Machine, rivals: Sequence[Rival], inflated: float,
     return Separation(prior, lack, dict(zip(channels, parts.tolist(), strict=True)), ends)
 
 
-def deviations(machine: Machine, rival: Rival, inflated: float,
-               ) -> tuple[tuple[str, ...], FloatArray, FloatArray]:
-    """Return a rival's m names, and their covariances before and after tests, shape (m, m)."""
+def sharpening(machine: Machine, rival: Rival, inflated: float,
+               every: bool) -> tuple[float, dict[str, tuple[float, float]]]:
+    """
+    Return how well planned tests determine a rival's effects, or all its numbers if `every`.
+
+    That is the fall of the logarithm of a deviation, summed over all directions, and the standard
+    deviations before and after the tests, by number.
+    """
     fit = _Fit(_planned(machine, known_to(machine, rival)), rival, inflated)
-    names = [fit.numbers[j].name for j in fit.known]
+    own = {p.name for form in rival.forms_of(machine) for p in form.parameters}
+    wanted = [j for j in fit.known if every or fit.numbers[j].name in own] or fit.known
+    names = [fit.numbers[j].name for j in wanted]
     hessian = fit.first[1]
     unit = np.sqrt(np.outer(np.diag(hessian), np.diag(hessian)))
     inverse = solved(factored(hessian / unit, ROUNDING), np.eye(len(unit))) / unit
-    return (tuple(names), rival.covariance_of(names),
-            np.asarray(inflated * inverse[np.ix_(fit.known, fit.known)]))
+    both = rival.covariance_of(names), inflated * inverse[np.ix_(wanted, wanted)]
+    before, after = (np.linalg.slogdet(covariance)[1] for covariance in both)
+    deviations = (np.sqrt(np.maximum(np.diag(covariance), 0.0)).tolist() for covariance in both)
+    return 0.5 * float(before - after), {
+        name: (one, other) for name, one, other in zip(names, *deviations, strict=True)}
 
 
 def _planned(machine: Machine, point: Point) -> LeastSquares:
@@ -107,9 +118,10 @@ class _Fit:
         self._problem, self._inflated = problem, inflated
         self.numbers = numbers_of(problem.machine, rival)
         own = known_to(problem.machine, rival)
-        self._start = np.array([own.get(p.name, 0.0) for p in self.numbers])
-        self._low, self._high = (np.array([getattr(p, side) for p in self.numbers]) - self._start
-                                 for side in ('low', 'high'))
+        low, high = (np.array([getattr(p, side) for p in self.numbers])
+                     for side in ('low', 'high'))
+        self._start = np.clip([own.get(p.name, 0.0) for p in self.numbers], low, high)
+        self._low, self._high = low - self._start, high - self._start
         self.known = [j for j, p in enumerate(self.numbers) if p.name in rival.names]
         self._precision = np.diag(proper_precision(self.numbers))
         self._zero = np.zeros(self._start.size)
@@ -155,11 +167,12 @@ class _Fit:
                 step = box_constrained_step(hessian, slope, self._low - x, self._high - x)
                 ahead = np.clip(x + length * step, self._low, self._high)
                 left = self._problem.residuals(self._point(ahead)) - truth
-                after = self._cost(ahead, left)
-                gained = after < cost
-                length = 1.0 if gained else _SHORTER * length
-                if gained:
-                    x, rest, cost = ahead, left, after
+                gain = cost - self._cost(ahead, left)
+                length = 1.0 if gain > 0.0 else _SHORTER * length
+                if gain > 0.0:
+                    x, rest, cost = ahead, left, cost - gain
+                if abs(gain) < _SETTLED:
+                    break
         return cost, self._point(x), rest
 
     def _derivatives(self, x: FloatArray, residual: FloatArray) -> tuple[Jacobian, FloatArray]:
