@@ -21,8 +21,8 @@ from simgap.settings import DEFAULT
 
 # A rival as good as impossible is no less probable than this.
 _LEAST = 1e-12
-# Gauss-Newton steps, passes with derivatives of their own, what is left of a step without gain, and
-# the gain of a step that is the last one [half chi-square].
+# Gauss-Newton steps, passes with derivatives of their own, what is left of a step without gain,
+# and the gain of a step that is the last one [half chi-square].
 _STEPS, _PASSES, _SHORTER, _SETTLED = 8, 2, 0.3, 0.01
 
 
