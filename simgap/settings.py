@@ -173,7 +173,6 @@ class PlanningSettings:
     least_information: float = _at(
         0.02, 'nat', 'expected information from which a test helps; of standard deviations, the '
         'share by which one shrinks')
-    caution: float = _at(3.0, '1', 'by what promised evidence is divided where tests are compared')
     unlisted: float = _at(
         0.25, 'probability', 'least probability that no answer of an open verdict is true: weight '
         'of how well a test shows other effects')

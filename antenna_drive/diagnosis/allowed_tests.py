@@ -164,20 +164,6 @@ class AntennaTests(TestSpace):
             return _with_pot(sheet, float(random.choice([0.4, 0.7, 1.0, 1.2])))
         return sheet
 
-    def nearby(self, family: str, test: Any, random: np.random.Generator) -> TestSheet:
-        """Return a test like another one: its amplitude, times or bias a little different."""
-        waveform, scale = test.waveform, float(np.exp(random.normal(0.0, 0.25)))
-        which, name = random.integers(3), 'amplitude_deg_s'
-        if which == 0 and isinstance(test.bias, CircuitBias) and test.bias.bias_pot:
-            return _with_pot(test, scale)
-        if isinstance(waveform, Knots):
-            rates = _numbers(scale * np.array(waveform.rates_deg_s))
-            return replace(test, waveform=replace(waveform, rates_deg_s=rates))
-        if which == 1 and isinstance(waveform, (Square, Triangle)) and waveform.period_s:
-            name = 'period_s'
-        return replace(test, waveform=replace(
-            waveform, **{name: _rounded(scale * getattr(waveform, name))}))
-
     def machine(self, test: Any) -> AntennaMachine:
         return AntennaMachine({'next': planned(test, self._duration, SAMPLE_RATE)}, self._drive,
                               threads=1)

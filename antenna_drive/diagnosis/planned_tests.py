@@ -17,6 +17,7 @@ from antenna_drive.recording.sheet import (
 import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import breadth_first_order
+from simgap.machine.process import with_process
 from simgap.next_test.confusability import Confusability, confusability
 
 BUILT_IN: Mapping[str, TestSheet] = {
@@ -48,9 +49,9 @@ def confusability_of(tests: Mapping[str, Recording], drive: Drive,
                      threads: int = 2) -> Confusability:
     """Say which effects these tests, planned or made ones by name, can tell apart."""
     machine = AntennaMachine(tests, drive, threads)
-    return confusability(machine.with_experiments([
+    return confusability(with_process(machine.with_experiments([
         replace(e, measured=machine.predict({}, k))
-        for k, e in enumerate(machine.experiments)]), progress)
+        for k, e in enumerate(machine.experiments)])), progress)
 
 
 def passing_for(found: Confusability, index: int, most: int) -> list[str]:

@@ -94,8 +94,7 @@ def proposed(arguments: argparse.Namespace, tests: Callable[[dict[str, Any]], Te
     with Progress('proposal', 1.0) as progress:
         try:
             found = TestDesign(space, findings, objective, arguments.suspect, arguments.jobs,
-                               seed=arguments.seed).run(
-                lambda share, doing: progress.update(share))
+                               seed=arguments.seed).run(progress.update)
         except KeyError as error:
             raise UserError(f'{arguments.verdict}: {error.args[0]}: this configuration knows no '
                             'such effect; give the model of the diagnosis') from error

@@ -37,7 +37,7 @@ class ModelBench(Bench):
         self._play(number, test, duration, out)
         constants = test.with_suffix('.yaml')
         if constants.exists():
-            (out.parent / f'test_{number}.yaml').write_bytes(constants.read_bytes())
+            test.with_name(f'test_{number}.yaml').write_bytes(constants.read_bytes())
 
     def diagnose(self, recordings: Mapping[str, Path], progress: Progress,
                  earlier: Sequence[Rival]) -> Verdict:

@@ -17,7 +17,6 @@ from simgap.fit.noise import with_model_error
 from simgap.fit.state import FitState, prior_precision, proper_precision
 from simgap.machine.contract import FloatArray, Machine, Parameter
 from simgap.machine.everyday import everyday_of
-from simgap.machine.process import with_process
 from simgap.settings import DEFAULT
 
 # A size is found to this share of itself.
@@ -44,7 +43,6 @@ def confusability(machine: Machine, progress: Callable[[float], None] = lambda s
     `progress` gets the share that is done. `inflated` divides differences of the cost. `among`
     names the effects that are judged; empty for all.
     """
-    machine = with_process(machine)
     problem = LeastSquares(machine.with_experiments(
         with_model_error(machine.experiments, DEFAULT.noise)))
     return visibility(problem, problem.start(machine.nuisances, {}), progress, inflated, among)

@@ -5,10 +5,12 @@
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 import json
 import os
 from pathlib import Path
 import shutil
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from simgap.drafts import drafted
@@ -22,7 +24,6 @@ from simgap.settings import DEFAULT
 from simgap.verdict.diagnosis import Progress as Share
 from simgap.verdict.record import Verdict
 
-SETTINGS, STORY = 'investigation.json', 'story.json'
 # Why an investigation ends.
 DECIDED, NO_MORE, NOTHING_HELPS = 'decided', 'no more tests', 'nothing helps'
 NOTHING_KNOWN = 'nothing known explains it'
@@ -67,25 +68,21 @@ class Investigation:
     """
     An investigation of a machine.
 
-    Everything lies in `folder`, which is made if it is not there. `first` is the first test; None
-    asks for the one that detects most. `threads` simulations run at once. Raises UserError if the
-    folder holds another investigation.
+    Everything lies in `folder`, which is made if it is not there; what lies there is not done
+    again. `first` is the first test; None asks for the one that detects most. `threads`
+    simulations run at once. Raises UserError if the folder holds another investigation.
     """
 
     def __init__(self, folder: Path, bench: Bench, plan: InvestigationPlan = InvestigationPlan(),
                  first: Any = None, threads: int = 2) -> None:
-        """Begin, or go on where an earlier run of the same investigation was."""
         self._folder, self._bench, self._plan, self._first = folder, bench, plan, first
         self._threads = threads
         folder.mkdir(parents=True, exist_ok=True)
         # more tests may be allowed later
         asked = {'until': plan.until, 'duration_s': plan.duration, 'seed': plan.seed,
                  'limits': bench.limits}
-        known = _read(folder / SETTINGS)
-        if known is None:
-            _write(folder / SETTINGS, asked)
-        elif known != asked:
-            differing = [key for key in asked if known.get(key) != asked[key]]
+        known = self._once('investigation', lambda: asked)
+        if differing := [key for key in asked if known.get(key) != asked[key]]:
             raise UserError(f'{folder}: holds an investigation with other settings '
                             f'({", ".join(differing)}); give the same ones to go on, or another '
                             '--out')
@@ -98,23 +95,26 @@ class Investigation:
         answers after it, and `ended`: why there are no more.
         """
         tests: list[dict[str, Any]] = []
-        ended = NO_MORE
+        ended, findings = NO_MORE, Findings()
         for number in range(1, self._plan.most + 1):
-            proposal = self._proposal(number, progress)
+            proposal = self._once(f'proposal_{number}', partial(
+                self._designed, number, findings, progress))
             if proposal['test'] is None:
                 ended = NOTHING_HELPS
                 break
             self._record(number, progress)
-            verdict = self._verdict(number, progress)
+            verdict = self._once(f'verdict_{number}', partial(
+                self._diagnosed, number, findings.rivals, progress))
+            findings = Findings.of_data(verdict['planning'])
             tests.append(_chapter(number, proposal, verdict))
-            _write(self._folder / STORY, {'tests': tests, 'ended': None})
+            self._write('story', {'tests': tests, 'ended': None})
             if self._is_sure(tests):
                 named = tests[-1]['answers'][0]['effects']
                 ended = NOTHING_KNOWN if named == _UNKNOWN else DECIDED
                 break
         story = {'tests': tests, 'ended': ended,
                  'seconds_of_testing': self._plan.duration * len(tests)}
-        _write(self._folder / STORY, story)
+        self._write('story', story)
         return story
 
     def _is_sure(self, tests: Sequence[Mapping[str, Any]]) -> bool:
@@ -122,78 +122,70 @@ class Investigation:
         if len(tests) < 2:
             return False
         before, last = (test['answers'][0] for test in tests[-2:])
-        until = self._plan.until
-        if last['effects'] == _UNKNOWN:
-            # no verdict gives it more
-            until *= DEFAULT.verdict.most_unknown
-        return last['probability'] >= until and last['effects'] == before['effects']
+        # no verdict gives 'unknown' more
+        most = DEFAULT.verdict.most_unknown if last['effects'] == _UNKNOWN else 1.0
+        return bool(last['probability'] >= most * self._plan.until
+                    and last['effects'] == before['effects'])
 
-    def _path(self, stem: str, number: int, suffix: str = '.json') -> Path:
-        return self._folder / f'{stem}_{number}{suffix}'
+    def _designed(self, number: int, findings: Findings, progress: Progress) -> dict[str, Any]:
+        """Save a test, and return its proposal; the first one detects, the others separate."""
+        space, test = self._bench.space, self._first
+        if number > 1 or test is None:
+            proposal = TestDesign(
+                space, findings, objective_for(findings), threads=self._threads,
+                seed=self._plan.seed + number).run(partial(progress, f'design of test {number}'))
+            found = as_data(proposal, space)
+            test = proposal.tests[0].test if proposal.tests else None
+        else:
+            found = {'objective': 'given', 'family': 'given', 'test': space.as_data(test)}
+        if test is not None:
+            self._bench.save(test, self._played(number))
+        return found
 
     def _played(self, number: int) -> Path:
         return self._folder / self._bench.played.format(number=number)
 
-    def _proposal(self, number: int, progress: Progress) -> dict[str, Any]:
-        """Return the proposal of a test; the first one detects, the others separate."""
-        path = self._path('proposal', number)
-        found = _read(path)
-        if found is None or not (found['test'] is None or self._played(number).exists()):
-            found, test = self._designed(number, progress)
-            if test is not None:
-                self._bench.save(test, self._played(number))
-            _write(path, found)
-        return found
-
-    def _designed(self, number: int, progress: Progress) -> tuple[dict[str, Any], Any]:
-        """Return a proposal as data, and its test, None if none helps."""
-        space = self._bench.space
-        if number == 1 and self._first is not None:
-            return {'objective': 'given', 'family': 'given',
-                    'test': space.as_data(self._first)}, self._first
-        findings = self._findings(number - 1)
-        found = TestDesign(
-            space, findings, objective_for(findings), threads=self._threads,
-            seed=self._plan.seed + number).run(
-                lambda share, doing: progress(f'design of test {number}', share))
-        return as_data(found, space), found.tests[0].test if found.tests else None
-
-    def _findings(self, number: int) -> Findings:
-        """Return what the verdict after a test says; nothing before the first one."""
-        verdict = _read(self._path('verdict', number))
-        return Findings.of_data(verdict['planning']) if verdict else Findings()
-
     def _record(self, number: int, progress: Progress) -> None:
         """Run a test; the recording gets its name once it is whole."""
-        if self._recording(number) is not None:
+        if f'test_{number}' in self._recordings(number):
             return
         progress(f'test {number}', 0.0)
-        draft = self._folder / f'.test_{number}.{os.getpid()}'
         for old in self._folder.glob('.test_*'):
-            _remove(old)
-        try:
+            shutil.rmtree(old, ignore_errors=True)
+        with TemporaryDirectory(prefix='.test_', dir=self._folder) as drafts:
+            draft = Path(drafts) / 'draft'
             self._bench.run(number, self._played(number), self._plan.duration, draft)
-            os.replace(draft, self._path('test', number, '' if draft.is_dir() else '.csv'))
-        finally:
-            _remove(draft)
+            os.replace(draft, self._folder / f'test_{number}{"" if draft.is_dir() else ".csv"}')
 
-    def _recording(self, number: int) -> Path | None:
-        return next((path for suffix in ('', '.csv')
-                     if (path := self._path('test', number, suffix)).exists()), None)
+    def _recordings(self, number: int) -> dict[str, Path]:
+        """Return the recordings that are there up to a test, by name."""
+        return {f'test_{k}': path for k in range(1, number + 1) for suffix in ('', '.csv')
+                if (path := self._folder / f'test_{k}{suffix}').exists()}
 
-    def _verdict(self, number: int, progress: Progress) -> dict[str, Any]:
+    def _diagnosed(self, number: int, earlier: Sequence[Rival],
+                   progress: Progress) -> dict[str, Any]:
         """Return the verdict on all recordings up to a test."""
-        path = self._path('verdict', number)
-        found = _read(path)
-        if found is not None:
-            return found
-        recorded = {f'test_{k}': self._recording(k) for k in range(1, number + 1)}
-        diagnosis = self._bench.diagnose(
-            {name: there for name, there in recorded.items() if there is not None},
+        return self._bench.diagnose(
+            self._recordings(number),
             lambda share, doing: progress(f'diagnosis after test {number}', share),
-            self._findings(number - 1).rivals)
-        _write(path, diagnosis.as_data())
-        return json.loads(path.read_text(encoding='utf-8'))  # type: ignore[no-any-return]
+            earlier).as_data()
+
+    def _once(self, name: str, make: Callable[[], Mapping[str, Any]]) -> dict[str, Any]:
+        """Return the plain data of a file in the folder, which is made if it is not there."""
+        path = self._folder / f'{name}.json'
+        if not path.exists():
+            self._write(name, make())
+        try:
+            found: dict[str, Any] = json.loads(path.read_text(encoding='utf-8'))
+        except ValueError as error:
+            raise UserError(
+                f'{path}: no JSON ({error}); remove it to have it made anew') from error
+        return found
+
+    def _write(self, name: str, data: Mapping[str, Any]) -> None:
+        """Write plain data whole or not at all."""
+        with drafted(self._folder / f'{name}.json') as stream:
+            stream.write(json.dumps(data, indent=2, default=float).encode())
 
 
 def _chapter(number: int, proposal: Mapping[str, Any],
@@ -237,26 +229,3 @@ def headline(story: Mapping[str, Any]) -> tuple[str, str]:
         return 'No test', said[-1]
     first = story['tests'][-1]['answers'][0]
     return ' + '.join(first['effects']), f'{100.0 * first["probability"]:.0f} % sure; {said[-1]}'
-
-
-def _read(path: Path) -> dict[str, Any] | None:
-    if not path.exists():
-        return None
-    try:
-        found: dict[str, Any] = json.loads(path.read_text(encoding='utf-8'))
-        return found
-    except ValueError as error:
-        raise UserError(f'{path}: no JSON ({error}); remove it to have it made anew') from error
-
-
-def _write(path: Path, data: Mapping[str, Any]) -> None:
-    """Write plain data whole or not at all."""
-    with drafted(path) as stream:
-        stream.write(json.dumps(data, indent=2, default=float).encode())
-
-
-def _remove(path: Path) -> None:
-    if path.is_dir():
-        shutil.rmtree(path, ignore_errors=True)
-    else:
-        path.unlink(missing_ok=True)

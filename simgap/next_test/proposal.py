@@ -35,13 +35,10 @@ def as_data(proposal: Proposal, space: TestSpace) -> dict[str, Any]:
         'tried': proposal.tried, 'refused': dict(proposal.refused),
         'unnamed': dict(proposal.unnamed), 'limits': dict(space.limits),
         'helps': bool(proposal.tests), 'test': None}
-    if proposal.tests:
-        best = proposal.tests[0]
-        found |= {'family': best.family, 'test': space.as_data(best.test),
-                  'limits_used': dict(best.use), **_told(best, rivals)}
-        found['others'] = [
-            {'family': test.family, 'test': space.as_data(test.test), **_told(test, rivals)}
-            for test in proposal.tests[1:1 + _OTHERS]]
+    told = [{'family': test.family, 'test': space.as_data(test.test), **_told(test, rivals)}
+            for test in proposal.tests[:1 + _OTHERS]]
+    if told:
+        found |= {**told[0], 'limits_used': dict(proposal.tests[0].use), 'others': told[1:]}
     else:
         found['beyond_limits'] = [
             {'family': test.family, 'limit': test.tightest[0], 'share': test.tightest[1],
@@ -59,24 +56,17 @@ def _told(test: Candidate, rivals: Sequence[Rival]) -> dict[str, Any]:
     if test.deviations:
         found['deviations'] = {name: {'before': before, 'after': after}
                                for name, (before, after) in test.deviations.items()}
-    told, first = test.separation, test.promised
-    if told is not None:
-        sure = DEFAULT.planning.sure
-        after = told.posterior()
+    if (told := test.separation) is not None:
+        sure, after = DEFAULT.planning.sure, told.posterior()
         found['expected'] = {
-            'confirmed': test.confirmed is not None,
-            'right_before': float(told.prior @ told.prior),
-            'right_after': told.expected(),
-            'information_nat': told.information(),
+            'confirmed': True, 'right_before': float(told.prior @ told.prior),
+            'right_after': told.expected(), 'information_nat': told.information(),
             'surely': told.surely(sure), 'sure': sure,
             'each': [{'effects': list(rival.named) or ['none'], 'before': float(told.prior[i]),
                       'after_if_true': float(after[i, i]), 'after': after[i].tolist()}
                      for i, rival in enumerate(rivals)],
             'lack_of_fit': told.lack.tolist()}
-        if first is not None:
-            found['channels'] = dict(first.channels)
-            found['expected']['promised'] = first.expected()
-        found['sizes_over_least'] = test.coarseness
+        found |= {'channels': dict(told.channels), 'sizes_over_least': test.coarseness}
     elif test.sizes:
         found['smallest_sizes'] = {
             name: {'size': size if math.isfinite(size) else None, 'unit': unit}
@@ -86,14 +76,12 @@ def _told(test: Candidate, rivals: Sequence[Rival]) -> dict[str, Any]:
 
 def lines(data: Mapping[str, Any]) -> list[str]:
     """Return what a proposal says as people read it, from its plain data."""
-    found = []
-    if not data['helps']:
-        found += _nothing(data)
-    else:
+    if data['helps']:
         limit, share = max(data['limits_used'].items(), key=lambda item: item[1])
-        found.append(f'next test: {data["family"]}; it uses {100.0 * share:.0f} % of {limit}, '
-                     'the nearest limit')
-        found += _promises(data)
+        found = [f'next test: {data["family"]}; it uses {100.0 * share:.0f} % of {limit}, '
+                 'the nearest limit', *_promises(data)]
+    else:
+        found = ['no test within the limits helps', _why_none(data)]
     found += [f'  no test of these kinds tells {" from ".join(item["rivals"])}'
               + (f'; a {item["sensors"][0]["sensor"]} would' if item['sensors'] else
                  '; no further sensor that the model knows would') for item in
@@ -105,60 +93,51 @@ def lines(data: Mapping[str, Any]) -> list[str]:
     return found
 
 
-def _nothing(data: Mapping[str, Any]) -> list[str]:
-    """Say that no test helps, and which limit stands in the way."""
-    found = ['no test within the limits helps']
+def _why_none(data: Mapping[str, Any]) -> str:
+    """Say which limit stands in the way of a test."""
     if data['beyond_limits']:
         best = data['beyond_limits'][0]
-        found.append(f'  the limit that costs most is {best["limit"]}: a test '
-                     f'({best["family"]}) that uses {100.0 * best["share"]:.0f} % of it would')
-    elif data['objective'] == SEPARATE and len(data['rivals']) < 2:
-        found.append('  there is one answer only, and nothing to tell apart; --objective sharpen '
-                     'makes its numbers more certain')
-    else:
-        found.append('  nor does one beyond them, of those that were tried')
-    return found
+        return (f'  the limit that costs most is {best["limit"]}: a test '
+                f'({best["family"]}) that uses {100.0 * best["share"]:.0f} % of it would')
+    if data['objective'] == SEPARATE and len(data['rivals']) < 2:
+        return ('  there is one answer only, and nothing to tell apart; --objective sharpen '
+                'makes its numbers more certain')
+    return '  nor does one beyond them, of those that were tried'
 
 
 def _promises(data: Mapping[str, Any]) -> list[str]:
     found = []
-    if 'expected' in data:
-        expected = data['expected']
-        how = ('each rival fitted to the others' if expected['confirmed'] else
-               'to first order, not confirmed by fits')
-        found.append(f'  if one of {len(expected["each"])} rivals is true, it is expected to get '
-                     f'{100.0 * expected["right_after"]:.0f} % after it '
-                     f'({100.0 * expected["right_before"]:.0f} % now; {how})')
-        found.append(f'  the answer is then {100.0 * expected["sure"]:.0f} % sure or more with '
-                     f'probability {expected["surely"]:.2f}')
-        found += [f'  {100.0 * item["before"]:5.1f} % now, {100.0 * item["after_if_true"]:5.1f} % '
-                  f'after if true: {" + ".join(item["effects"])}' for item in expected['each']]
-        found.append('  if none of them is true: it shows other effects from '
-                     f'{data["sizes_over_least"]:.1f} times the least size of all tests that were '
-                     'judged (in the mean)')
-    parts = sorted(data.get('unnamed', {}).items(), key=lambda item: -item[1])
-    if parts:
+    if expected := data.get('expected'):
+        found += [
+            f'  if one of {len(expected["each"])} rivals is true, it is expected to get '
+            f'{100.0 * expected["right_after"]:.0f} % after it '
+            f'({100.0 * expected["right_before"]:.0f} % now; each rival fitted to the others)',
+            f'  the answer is then {100.0 * expected["sure"]:.0f} % sure or more with '
+            f'probability {expected["surely"]:.2f}',
+            *(f'  {100.0 * item["before"]:5.1f} % now, {100.0 * item["after_if_true"]:5.1f} % '
+              f'after if true: {" + ".join(item["effects"])}' for item in expected['each']),
+            f'  if none of them is true: it shows other effects from '
+            f'{data["sizes_over_least"]:.1f} times the least size of all tests that were judged '
+            '(in the mean)']
+    if parts := sorted(data.get('unnamed', {}).items(), key=lambda item: -item[1]):
         found.append('  what has no name yet may lie in ' + ', '.join(
             f'{part} ({100.0 * share:.0f} %)' for part, share in parts)
             + '; effects there count most')
-    for name, item in list(data.get('deviations', {}).items())[:_SIZES]:
-        found.append(f'  {name}: standard deviation {item["before"]:.3g} now, '
-                     f'{item["after"]:.3g} after')
-    sizes = sorted(data.get('smallest_sizes', {}).items(), key=lambda item: item[0])
-    for name, item in sizes[:_SIZES]:
-        found.append(f'  {name}: shows from ' + (
-            'no size on' if item['size'] is None else f'{item["size"]:.3g} {item["unit"]}'))
-    if len(sizes) > _SIZES:
-        found.append(f'  and {len(sizes) - _SIZES} more, see the JSON')
-    return found
+    found += [f'  {name}: standard deviation {item["before"]:.3g} now, {item["after"]:.3g} after'
+              for name, item in list(data.get('deviations', {}).items())[:_SIZES]]
+    sizes = sorted(data.get('smallest_sizes', {}).items())
+    found += [f'  {name}: shows from ' + (
+        'no size on' if item['size'] is None else f'{item["size"]:.3g} {item["unit"]}')
+        for name, item in sizes[:_SIZES]]
+    return found + ([f'  and {len(sizes) - _SIZES} more, see the JSON']
+                    if len(sizes) > _SIZES else [])
 
 
 def contents(proposal: Proposal, space: TestSpace) -> dict[str, Any]:
     """Return what the page about a proposal says: what proposal.html lists."""
     data = as_data(proposal, space)
-    said = lines(data)
     if not data['helps']:
-        return {'title': 'No test within the limits helps', 'lead': said[1].strip(),
+        return {'title': 'No test within the limits helps', 'lead': lines(data)[1].strip(),
                 'data': data, 'panels': ()}
     lead = (f'Chosen among {proposal.tried} simulated tests. Every rival keeps '
             f'{100.0 * DesignEffort.margin:.0f} % of every limit in it.')
@@ -167,17 +146,16 @@ def contents(proposal: Proposal, space: TestSpace) -> dict[str, Any]:
 
 
 def _panels(proposal: Proposal, space: TestSpace) -> list[Panel]:
-    machine = space.machine(proposal.tests[0].test)
-    shown = sorted(proposal.rivals, key=lambda rival: -rival.probability)[:3]
-    readings = machine.simulate([known_to(machine, rival) for rival in shown] or [{}])
-    experiment = machine.experiments[0]
-    command = space.command(proposal.tests[0].test)
+    test = proposal.tests[0].test
+    machine, command = space.machine(test), space.command(test)
+    [experiment] = machine.experiments
+    likeliest = sorted(proposal.rivals, key=lambda rival: -rival.probability)[:3]
+    readings = {named(rival): machine.predict(known_to(machine, rival), 0)
+                for rival in likeliest} or {'model': machine.predict({}, 0)}
     panels: list[Panel] = [] if command is None else [
         ('', 'command', command[2], [('command', *command[:2])])]
-    for c, channel in enumerate(experiment.channels):
-        curves = [(named(rival), experiment.time, np.asarray(values[0])[:, c])
-                  for rival, values in zip(shown, readings, strict=True)
-                  if values[0] is not None] if shown else [
-            ('model', experiment.time, np.asarray(readings[0][0])[:, c])]
-        panels.append(('', channel, experiment.units[c], curves))
-    return panels
+    return panels + [
+        ('', channel, unit, [(name, experiment.time, np.asarray(values)[:, c])
+                             for name, values in readings.items()])
+        for c, (channel, unit) in enumerate(zip(experiment.channels, experiment.units,
+                                                strict=True))]

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
 """
-What a verdict knows of its rivals: the next test is designed from it, see `discrimination`.
+What a verdict knows of its rivals: the next test is designed from it, see `separation`.
 
 Each rival is a hypothesis with its fitted numbers and their covariance. Numbers of a single test,
 such as where it starts, are integrated out: the next test has its own.

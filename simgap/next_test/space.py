@@ -32,10 +32,6 @@ class TestSpace(ABC):
     def use(self, machine: Machine, points: Sequence[Point]) -> Mapping[str, float]:
         """Return the share of each limit that a test uses at the worst of the points."""
 
-    def nearby(self, family: str, test: Any, random: np.random.Generator) -> Any:
-        """Return a test like another one; by default another of the same family."""
-        return self.draw(family, random)
-
     def command(self, test: Any) -> tuple[FloatArray, FloatArray, str] | None:
         """Return times [s] and values of the command of a test, shape (n,), and their unit."""
         return None

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import replace
 import json
 from typing import Any
@@ -12,19 +13,19 @@ from typing import Any
 from blas_threads import during, Look
 import numpy as np
 import pytest
-from simgap.machine.contract import Effect, Experiment, FloatArray, Form, Machine, Parameter, Point
+from simgap.machine.contract import (
+    Course, DisturbanceInput, Effect, Experiment, FloatArray, Form, Machine, Parameter, Point,
+)
 from simgap.next_test import design
 from simgap.next_test.candidate import Candidate
 from simgap.next_test.design import CRITERIA, DesignEffort, TestDesign
 from simgap.next_test.proposal import as_data, contents, lines
-from simgap.next_test.rival_fits import confirmed_separation
 from simgap.next_test.rivals import Findings
-from simgap.next_test.separation import Separation
+from simgap.next_test.separation import Separation, separation
 from simgap.next_test.space import TestSpace
 from simgap.search.rival import Rival
-from simgap.settings import DEFAULT
 
-SMALL = DesignEffort(drawn=8, judged=6, varied=2, variants=2, confirmed=2)
+SMALL = DesignEffort(drawn=8, judged=6, fitted=6)
 
 
 class Lever(Machine):
@@ -108,8 +109,6 @@ def test_a_random_test_may_be_of_any_kind_that_is_allowed() -> None:
 
 def test_the_promise_for_the_best_test_is_confirmed_by_fits() -> None:
     found = TestDesign(Loads(1.6), Findings(HARD), effort=SMALL).run()
-    best = found.tests[0]
-    assert best.confirmed is not None and best.promised is not None
     data = as_data(found, Loads(1.6))
     assert data['expected']['confirmed']
     assert data['expected']['right_after'] > 0.95 > data['expected']['right_before']
@@ -118,7 +117,7 @@ def test_the_promise_for_the_best_test_is_confirmed_by_fits() -> None:
 
 
 class Promising(Loads):
-    """Great loads promise most, and there are enough of them to spend all fits on."""
+    """Great loads promise most."""
 
     families = ('modest', 'great')
 
@@ -126,33 +125,22 @@ class Promising(Loads):
         return float(random.uniform(*((0.3, 0.5) if family == 'modest' else (1.2, 1.6))))
 
 
-def test_where_a_family_breaks_its_promises_another_one_is_confirmed(
-        monkeypatch: pytest.MonkeyPatch) -> None:
-    def fitted(machine: Lever, *rest: Any) -> Separation:
-        told = confirmed_separation(machine, *rest)
-        return replace(told, lack=1e-3 * told.lack) if machine.load > 1.0 else told
+@pytest.mark.parametrize('kept, family', [(1.0, 'great'), (1e-3, 'modest')])
+def test_where_a_family_breaks_its_promises_another_one_is_proposed(
+        kept: float, family: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(machine: Lever, *rest: Any, fitted: bool = True) -> Separation:
+        told = separation(machine, *rest, fitted=fitted)
+        share = kept if fitted and machine.load > 1.0 else 1.0
+        return replace(told, lack=share * told.lack)
 
-    monkeypatch.setattr(design, 'confirmed_separation', fitted)
+    monkeypatch.setattr(design, 'separation', broken)
     found = TestDesign(Promising(2.0), Findings(HARD), effort=SMALL).run()
-    great = [test for test in found.tests if test.family == 'great']
-    assert len(great) > SMALL.rounds * SMALL.confirmed
-    assert found.tests[0].family == 'modest' and found.tests[0].confirmed is not None
-    # what a broken family still promises counts by the share that was kept
-    assert all(test.kept < 0.1 and test.score < found.tests[0].score
-               for test in great if test.confirmed is None)
-
-
-def test_what_is_confirmed_counts_in_full_though_its_family_broke_promises() -> None:
-    design_of_test = TestDesign(Loads(1.6), Findings(HARD), effort=SMALL)
-    doubted = replace(design_of_test.run().tests[0], confirmed=None, kept=0.1)
-    [found] = design_of_test._compared([design_of_test._confirmed(doubted)])
-    assert found.confirmed is not None
-    assert found.score == pytest.approx(_compound(found, DEFAULT.planning.unlisted))
+    assert found.tests[0].family == family
 
 
 def _compound(test: Candidate, unlisted: float) -> float:
-    assert test.confirmed is not None
-    told = test.confirmed.information(DEFAULT.planning.caution)
+    assert test.separation is not None
+    told = test.separation.information()
     return (1.0 - unlisted) * np.log(told) - unlisted * np.log(test.coarseness)
 
 
@@ -160,9 +148,8 @@ def test_other_effects_weigh_as_much_as_no_answer_is_likely() -> None:
     """A verdict leaves 0.6 to something without a name: its answers are worth 0.4."""
     doubted = [replace(rival, probability=0.4 * rival.probability) for rival in HARD]
     found = TestDesign(Loads(1.6), Findings(doubted), effort=SMALL).run()
-    confirmed = [test for test in found.tests if test.confirmed is not None]
-    assert confirmed
-    assert all(test.score == pytest.approx(_compound(test, 0.6)) for test in confirmed)
+    assert len(found.tests) > 1
+    assert all(test.score == pytest.approx(_compound(test, 0.6)) for test in found.tests)
 
 
 def test_where_no_load_within_the_limit_helps_the_limit_is_named() -> None:
@@ -216,23 +203,6 @@ def test_a_suspicion_is_looked_for_alone() -> None:
     assert found.tests[0].test == greatest
 
 
-def test_variants_are_of_the_tests_that_detect_most() -> None:
-    class Varied(Loads):
-        def __init__(self) -> None:
-            super().__init__(1.6)
-            self.varied: list[float] = []
-
-        def nearby(self, family: str, test: Any, random: np.random.Generator) -> Any:
-            self.varied.append(test)
-            return super().nearby(family, test, random)
-
-    space = Varied()
-    TestDesign(space, objective='detect', effort=SMALL).run()
-    assert len(space.varied) == SMALL.varied * SMALL.variants
-    # the stronger the load, the more shows
-    assert min(space.varied) >= 0.5
-
-
 class Heated(Loads):
     """The same loads, with heat or without: only heat shows how the lever expands."""
 
@@ -266,7 +236,7 @@ def test_of_tests_that_tell_the_rivals_apart_one_that_shows_more_is_proposed(see
     found = TestDesign(Heated(1.6), Findings(HARD), effort=SMALL, seed=seed).run()
     best, cold = found.tests[0], next(t for t in found.tests if not t.test[1])
     for test in (best, cold):
-        assert test.promised is not None and test.promised.expected() > 0.95
+        assert test.separation is not None and test.separation.expected() > 0.95
     assert best.test[1]
     # the expansion, one effect of four, counts as a thousand times too large in the cold
     assert cold.coarseness / best.coarseness == pytest.approx(1000.0 ** 0.25, rel=0.2)
@@ -348,3 +318,46 @@ def test_linear_algebra_has_one_thread_because_tests_are_judged_side_by_side() -
 
     assert during(lambda look: TestDesign(
         Watched(look), Findings(HARD), effort=SMALL).run()) == {1}
+
+
+class Windy(Lever):
+    """The lever in the wind of every day, with a coarse twin that knows none."""
+
+    def __init__(self, load: float, seen: list[str], wind: float) -> None:
+        super().__init__(load)
+        self.disturbance_inputs = (
+            DisturbanceInput('wind', 'lever', everyday=wind, everyday_s=0.1),)
+        self._seen = seen
+        self._coarse: Machine = copy(self)
+
+    def low_fidelity(self) -> Machine:
+        return getattr(self, '_coarse', self)
+
+    def simulate_disturbed(self, point: Point, place: DisturbanceInput,
+                           course: Course) -> list[FloatArray]:
+        self._seen.append(place.name)
+        return [self.predict(point, 0) + course(self.experiments[0].time)[:, np.newaxis]]
+
+
+def test_a_test_is_judged_in_the_wind_of_every_day_which_is_simulated_once() -> None:
+    class Outdoors(Loads):
+        def __init__(self, wind: float) -> None:
+            super().__init__(1.6)
+            self.seen: list[str] = []
+            self.wind = wind
+
+        def machine(self, test: Any) -> Lever:
+            return Windy(test, self.seen, self.wind)
+
+    def found(wind: float) -> tuple[Candidate, int]:
+        space = Outdoors(wind)
+        test = TestDesign(space, Findings(HARD), effort=SMALL).run().tests[0]
+        return test, len(space.seen)
+
+    (calm, none), (windy, runs) = found(0.0), found(0.3)
+    scales = Windy(1.0, [], 0.3).time_scales
+    shifts = np.arange(0.0, scales.response_s - 0.5 * scales.pulse_s, scales.pulse_s).size
+    assert (none, runs) == (0, SMALL.fitted * shifts)
+    assert calm.separation is not None and windy.separation is not None
+    assert windy.separation.lack[0, 1] < 0.5 * calm.separation.lack[0, 1]
+    assert all(windy.sizes[name][0] > 1.5 * size for name, (size, _) in calm.sizes.items())

@@ -9,8 +9,8 @@ import pytest
 from simgap.fit.least_squares import LeastSquares
 from simgap.machine.contract import Effect, Experiment, FloatArray, Form, Machine, Parameter, Point
 from simgap.next_test.design import objective_for
-from simgap.next_test.discrimination import separation
 from simgap.next_test.rivals import Findings, rivals_of
+from simgap.next_test.separation import separation
 from simgap.search.hypothesis import Hypothesis
 from simgap.search.rival import Rival
 from simgap.settings import DEFAULT

@@ -20,7 +20,7 @@ from simgap.next_test.investigation import DECIDED, InvestigationPlan
 from simgap.next_test.rivals import Findings
 from simgap.search.rival import Rival
 
-SMALL = DesignEffort(drawn=6, judged=4, varied=1, variants=1, confirmed=1)
+SMALL = DesignEffort(drawn=6, judged=4, fitted=4)
 
 
 def push_off(duration_s: float, random: np.random.Generator) -> Log:
@@ -57,7 +57,7 @@ def test_the_limit_of_a_reading_is_kept() -> None:
     best = found.tests[0]
     assert best.test.constants['height'] <= SMALL.margin * 1.5
     assert found.refused == {'angle': sum(found.refused.values())}
-    assert best.confirmed is not None and best.confirmed.expected() > 0.99
+    assert best.separation is not None and best.separation.expected() > 0.99
 
 
 def test_readings_of_a_planned_test_have_the_errors_of_a_model() -> None:
