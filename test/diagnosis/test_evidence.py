@@ -157,7 +157,8 @@ def test_no_sample_counts_more_than_one_and_few_samples_tell_no_temperature() ->
 def test_each_effect_is_there_for_itself() -> None:
     """What several have to gain is the sum of theirs."""
     problem = LeastSquares(machine(0, {}))
-    evidence, shows = plain(problem), DEFAULT.evidence.shows
+    evidence, shows = plain(problem), DEFAULT.evidence.shows + (
+        DEFAULT.evidence.form_error ** 2 * 0.5 * problem.samples)
     for count in range(4):
         for effects in combinations('abcd', count):
             assert evidence.price(fitted(problem, ''.join(effects)).forms) == pytest.approx(
@@ -172,7 +173,7 @@ def test_an_order_that_was_sought_has_its_price() -> None:
 
 
 @pytest.mark.parametrize('tempered', [1.0, 3.0])
-def test_a_partner_has_to_gain_more_than_an_error_of_form_leaves(tempered: float) -> None:
+def test_an_effect_has_to_gain_more_than_an_error_of_form_leaves(tempered: float) -> None:
     """A form wrong by a share leaves the square of that share of its gain."""
     problem = LeastSquares(machine(2, {'a.size': 3.0, 'c.size': 0.5}))
     none, single, pair, three = (
@@ -182,7 +183,7 @@ def test_a_partner_has_to_gain_more_than_an_error_of_form_leaves(tempered: float
     assert found.gain == pytest.approx(gain)
     plainly, dear = plain(problem, tempered), plain(problem, tempered, gain)
     price = DEFAULT.evidence.form_error ** 2 * gain / tempered
-    for hypothesis, times in ((none, 0), (single, 0), (pair, 1), (three, 2)):
+    for hypothesis, times in ((none, 0), (single, 1), (pair, 2), (three, 3)):
         assert plainly(hypothesis) - dear(hypothesis) == pytest.approx(times * price)
 
 
