@@ -138,11 +138,10 @@ setup(
             # recordings as other people's programs write them
             'mcap-protobuf-support >= 0.5',
             'pyarrow >= 10',
-            # the drive as an FMU, and two programs that load it; libcosim comes as a wheel alone
+            # the drive as an FMU, and a program that loads it, which comes as a wheel alone
             'pythonfmu >= 0.7',
             'pythonfmu3 >= 0.3.4',
-            'fmpy >= 0.3.22',
-            f'libcosimpy ; {ROS["WHEELS_EXIST"]} and python_version >= "3.11"',
+            f"libcosimpy ; {ROS['WHEELS_EXIST']} and python_version >= '3.11'",
             # the page and the socket for Foxglove, and a client of both
             'tornado >= 6.1',
             'foxglove-sdk >= 0.30',

@@ -34,6 +34,7 @@ class AntennaDrive(Fmi{fmi}Slave):
     def __init__(self, **known):
         super().__init__(**known)
         if lacking:
+            print(lacking, file=sys.stderr)
             raise ImportError(lacking)
         self.drive = slave.joined(self, {library}, {fmi})
 
@@ -41,7 +42,7 @@ class AntennaDrive(Fmi{fmi}Slave):
         return slave.with_units(super().to_xml(*options), self.drive.variables)
 
     def do_step(self, time, step):
-        self.drive.step(step)
+        slave.told(self.drive.step, step)
         return True
 '''
 

@@ -3,11 +3,13 @@
 """What an FMU of the drive loads: it joins the drive to the library that speaks FMI."""
 
 from collections import Counter
+from collections.abc import Callable
 from functools import partial
 import json
 import math
 from pathlib import Path
 import re
+import sys
 from typing import Any
 from xml.etree.ElementTree import Element, SubElement
 
@@ -15,6 +17,7 @@ from antenna_drive import __version__
 from antenna_drive.fmu.stepped import OUTPUT, PARAMETER, SteppedDrive, Variable
 from antenna_drive.parameters import load
 from antenna_drive.parameters.sets import changed, Drive, values
+from simgap.errors import UserError
 
 # Among the resources of the FMU: everything that the drive needs.
 DRIVE_FILE = 'drive.json'
@@ -30,15 +33,24 @@ def drive_file(drive: Drive, step_s: float) -> str:
                        'drive': {path: value for path, _, value in values(drive)}})
 
 
+def told(act: Callable[..., Any], *given: Any) -> Any:
+    """Act; what is wrong is told on standard error, too: few importers show an FMU's reason."""
+    try:
+        return act(*given)
+    except UserError as error:
+        print(f'antenna_drive: {error}', file=sys.stderr)
+        raise
+
+
 def joined(slave: Any, library: Any, fmi: int) -> SteppedDrive:
     """Return the drive of an FMU, whose variables its slave then has; `library` speaks FMI."""
-    told = json.loads(Path(slave.resources, DRIVE_FILE).read_text(encoding='utf-8'))
+    known = json.loads(Path(slave.resources, DRIVE_FILE).read_text(encoding='utf-8'))
     drive = SteppedDrive(changed(load(), {
         path: tuple(value) if isinstance(value, list) else value
-        for path, value in told['drive'].items()}), told['step_s'])
+        for path, value in known['drive'].items()}), known['step_s'])
     slave.version = __version__
     slave.description = 'The elevation drive of a 34-m antenna, two motors with torque bias'
-    slave.default_experiment = library.DefaultExperiment(start_time=0.0, step_size=told['step_s'])
+    slave.default_experiment = library.DefaultExperiment(start_time=0.0, step_size=known['step_s'])
     causality, variability = (getattr(library, f'Fmi{fmi}{name}')
                               for name in ('Causality', 'Variability'))
     number = library.Real if fmi == 2 else library.Float64
@@ -55,8 +67,8 @@ def joined(slave: Any, library: Any, fmi: int) -> SteppedDrive:
             changing = 'continuous'
         slave.register_variable(kind(
             name, description=said, causality=causality[item.causality],
-            variability=variability[changing], getter=partial(drive.get, name),
-            setter=partial(drive.set, name)))
+            variability=variability[changing], getter=partial(told, drive.get, name),
+            setter=partial(told, drive.set, name)))
     return drive
 
 
