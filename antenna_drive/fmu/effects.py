@@ -19,6 +19,7 @@ from antenna_drive.parameters.records import record_of, set_of
 from antenna_drive.parameters.sets import Axis, Drive, entries
 import numpy as np
 from simgap.inputs.schema import Entry
+from simgap.machine.contract import Parameter
 
 
 def numbers() -> dict[str, tuple[Entry, float]]:
@@ -42,7 +43,7 @@ def numbers() -> dict[str, tuple[Entry, float]]:
 
 def with_effects(drive: Drive, given: Mapping[str, float]) -> Drive:
     """Return the drive with effects, whose `numbers` are given by name."""
-    acting = {}
+    acting: dict[str, Parameter] = {}
     for effect in catalogue().values():
         for form in effect.forms:
             if any(given[size.name] for size in form.sizes):

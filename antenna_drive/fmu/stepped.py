@@ -75,6 +75,7 @@ class SteppedDrive:
         self._rows = {name.replace('/', '.'): row for row, name in enumerate(DRIVE.signals)}
         self._drive, self._step_s = drive, step_s
         self._begun = self._changed = False
+        self._own: FloatArray  # what the test signal itself puts out
         self._begin(drive)
         # inputs by the macro-step from which on they count, as far back as the command is late
         self._given: deque[tuple[int, FloatArray]] = deque()
@@ -142,7 +143,7 @@ class SteppedDrive:
 
     def _begin(self, drive: Drive) -> None:
         self._emulator = Emulator(drive, self._step_s)
-        self._own = self._emulator.now[_ROWS].copy()  # what the test signal itself puts out
+        self._own = self._emulator.now[_ROWS].copy()
         self._delay_s = drive.test_signal.delay
 
     def _settings(self) -> dict[str, dict[str, Any]]:
