@@ -118,7 +118,8 @@ setup(
         'foxglove': ['foxglove-sdk >= 0.30'],
         # models that people have: `diagnose --model FILE.yaml`
         'mujoco': ['mujoco >= 3.3'],
-        'fmu': ['fmpy >= 0.3.22'],
+        # ... and the drive as one of them: `fmu`, of FMI 2 and of FMI 3
+        'fmu': ['fmpy >= 0.3.22', 'pythonfmu >= 0.7', 'pythonfmu3 >= 0.3.4'],
         # the first release that can complete a chunk on demand
         'recording': ['mcap >= 1.5'],
         # bags of other machines; the first rosbags that reads a storage file alone
@@ -137,6 +138,10 @@ setup(
             # recordings as other people's programs write them
             'mcap-protobuf-support >= 0.5',
             'pyarrow >= 10',
+            # the drive as an FMU, and a program that loads it, which comes as a wheel alone
+            'pythonfmu >= 0.7',
+            'pythonfmu3 >= 0.3.4',
+            f"libcosimpy ; {ROS['WHEELS_EXIST']} and python_version >= '3.11'",
             # the page and the socket for Foxglove, and a client of both
             'tornado >= 6.1',
             'foxglove-sdk >= 0.30',

@@ -285,7 +285,7 @@ PARTS: dict[str, Callable[[], Iterator[Finding]]] = {
         'cluster': ('distributed',),
         'completion': ('shtab',),
         'mujoco': ('mujoco',),
-        'fmu': ('fmpy',),
+        'fmu': ('fmpy', 'pythonfmu', 'pythonfmu3'),
         'test': ('pytest', 'pytest_timeout', 'xdist', 'hypothesis', 'mypy', 'rosbags', 'flake8',
                  'vermin'),
         'bench': ('control', 'pathsim', 'pydrake'),

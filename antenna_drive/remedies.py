@@ -18,4 +18,6 @@ REMEDIES.update({
     'tornado': 'pip install tornado',
     'foxglove': 'pip install foxglove-sdk',
     'pyarrow': 'pip install pyarrow',
+    'pythonfmu': 'pip install pythonfmu',
+    'pythonfmu3': 'pip install pythonfmu3',
 })

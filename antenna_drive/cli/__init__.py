@@ -20,6 +20,7 @@ COMMANDS = {
     'live': Command('live', 'open a page to see and turn a running drive'),
     'compile': Command('compile_', 'compile the physics ahead of the first run'),
     'run': Command('run', 'run the drive in one process and write its signals'),
+    'fmu': Command('fmu', 'write the drive as an FMU for other simulation programs'),
     'configure': Command('configure', 'make a configuration of your own drive from its data '
                                       'sheets'),
     'article': Command('article', "repeat the article's experiments and compare the figures"),

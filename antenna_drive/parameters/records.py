@@ -5,11 +5,13 @@
 from dataclasses import fields
 from functools import cache
 import os
-from typing import Any, get_type_hints
+from typing import Any, get_type_hints, TypeVar
 
 import numpy as np
 from simgap.errors import UserError
 from simgap.inputs.schema import Entry
+
+Set = TypeVar('Set')
 
 
 @cache
@@ -65,6 +67,23 @@ def record_of(parameters: Any) -> np.ndarray[Any, np.dtype[Any]]:
     record = np.zeros(1, dtype_of(kind))
     _fill(record, parameters)
     return record
+
+
+def set_of(kind: type[Set], record: Any) -> Set:
+    """Return the parameter set of a record, in an array of one; the inverse of `record_of`."""
+    hints: dict[str, Any] = get_type_hints(kind)
+    found: dict[str, Any] = {}
+    for item in fields(kind):  # type: ignore[arg-type]
+        part, entry = record[item.name], item.metadata.get('entry')
+        if entry is None:
+            found[item.name] = set_of(hints[item.name], part)
+        elif entry.lengths is not None:
+            found[item.name] = tuple(part[0, :record[f'{item.name}_count'][0]].tolist())
+        elif entry.choices is not None:
+            found[item.name] = entry.choices[part[0]]
+        else:
+            found[item.name] = part[0].item()
+    return kind(**found)
 
 
 def _fill(record: Any, parameters: Any) -> None:
