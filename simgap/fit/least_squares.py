@@ -80,9 +80,7 @@ class LeastSquares:
         z = z.ravel()
         z[~self.valid[self.rows(k)]] = 0.0
         # a prediction that diverged is a bad one, not an error
-        if not np.isfinite(z).all():
-            z = np.nan_to_num(z, nan=bound, posinf=bound, neginf=-bound)
-        return np.clip(z, -bound, bound, out=z)
+        return np.clip(np.nan_to_num(z, copy=False, nan=bound), -bound, bound, out=z)
 
     def whitened(self, k: int, changes: FloatArray) -> FloatArray:
         """Return changes of readings, shape (n, c, m), as residuals have them, shape (n c, m)."""

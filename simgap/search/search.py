@@ -239,10 +239,8 @@ class Search:
             lambda h: moves.refitted(self._problem, h, anchor, slopes), hypotheses)))
 
     def _slopes(self, at: Hypothesis) -> Jacobian:
-        point = at.state.point()
-        return self._problem.jacobian(
-            point, self._problem.machine.nuisances, None, False,
-            self._problem.local_steps(at.state))
+        return self._problem.jacobian(at.state.point(), self._problem.machine.nuisances, None,
+                                      False, self._problem.local_steps(at.state))
 
     def _continued(self, none: Hypothesis) -> list[Hypothesis]:
         """Return the answers of an earlier verdict, fitted from where they have ended."""
