@@ -29,12 +29,17 @@ _MOST_PAST_RUNS = 16
 
 
 class Step(NamedTuple):
-    """One complete step: its run and number, the macro-step [s], the value of every signal."""
+    """One complete step of a drive."""
 
     run: int
     number: int
-    step_s: float
-    values: list[float]
+    step_s: float  # macro-step [s]
+    numbers: list[float]  # of every signal its value and time derivative
+
+    @property
+    def values(self) -> list[float]:
+        """Return the value of every signal."""
+        return self.numbers[::2]
 
 
 class _Run:
@@ -75,6 +80,7 @@ class Follower:
     """
     Puts frames together to steps.
 
+    lengths : how many numbers a frame of each unit has
     run : the run in progress, 0 for none
     lost : steps that were missed after the first that was seen, in all runs together
     refused : frames that are none: wrong length, NaN or infinite, no run, no step, another than
@@ -89,7 +95,7 @@ class Follower:
         lengths : how many numbers a frame of each unit has, in the order of the signals
         conductor : the unit that owns the run: nobody else begins one
         """
-        self._lengths = dict(lengths)
+        self.lengths = dict(lengths)
         self._conductor = conductor
         self._runs: dict[float, _Run] = {}
         self._past: deque[float] = deque(maxlen=_MOST_PAST_RUNS)
@@ -100,13 +106,25 @@ class Follower:
         self.doubled: dict[str, tuple[float, float]] = {}
         self._over = False
 
+    @property
+    def senders(self) -> dict[str, float]:
+        """Return whose frames of the run in progress are read, by unit."""
+        return dict(self._runs[self.run].senders) if self.run else {}
+
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """Return the units whose frame of the next step has not come."""
+        run = self._runs.get(self._announced)
+        frames = {} if run is None else run.steps.get(run.next or 0, {})
+        return tuple(unit for unit in self.lengths if unit not in frames)
+
     def finish(self) -> None:
         """Expect no more frames: memories need not wait for newer ones."""
         self._over = True
 
     def receive(self, unit: str, frame: Sequence[float]) -> None:
         """Take in a frame of a unit."""
-        if len(frame) != self._lengths[unit] or not all_finite(frame):
+        if len(frame) != self.lengths[unit] or not all_finite(frame):
             self.refused += 1
             return
         if frame[0] == NO_RUN or frame[0] in self._past:
@@ -139,12 +157,12 @@ class Follower:
             self.refused += frames[unit] != frame
             return
         frames[unit] = frame
-        if run.newest is None and len(run.senders) == len(self._lengths):
+        if run.newest is None and len(run.senders) == len(self.lengths):
             # A unit goes one step ahead of the conductor. The conductor may be waiting for the
             # follower, so the unit's last step need not become complete before this one begins.
             run.newest = max(number - (self._conductor not in of_step)
                              for number, of_step in run.steps.items())
-        if len(frames) == len(self._lengths):
+        if len(frames) == len(self.lengths):
             run.complete.append(number)
 
     def steps(self) -> Iterator[Step]:
@@ -174,10 +192,10 @@ class Follower:
                 for older in [known for known in run.steps if known < number]:
                     del run.steps[older]
             run.next = number + 1
-            values: list[float] = []
-            for unit in self._lengths:
-                values += frames[unit][len(HEADER)::2]
-            yield Step(self.run, number, frames[self._conductor][2], values)
+            numbers: list[float] = []
+            for unit in self.lengths:
+                numbers += frames[unit][len(HEADER):]
+            yield Step(self.run, number, frames[self._conductor][2], numbers)
 
     def _turn(self, following: _Run) -> None:
         if self.run:

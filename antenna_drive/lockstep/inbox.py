@@ -69,12 +69,11 @@ class Inbox:
         self._early: deque[tuple[str, Frame, int]] = deque()
         self._past_runs: deque[float] = deque(maxlen=8)
 
-    def begin(self, run: float, step: int = 0) -> None:
+    def begin(self, run: float) -> None:
         """Turn to a new run: forget the old one's frames and take in those that came early."""
         self.forget(self.run)
         self.run = run
-        self.step = step
-        self._awaited = (run, float(step))
+        self.resume(0)
         self.senders.clear()
         self.doubled.clear()
         for slots in self.slots.values():
