@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 # A node's parameter: a test sheet that its unit plays.
 SHEET = 'sheet'
 # A node that has been asked to end has ended after this [s], whatever holds it.
-_END_S = 3.0
+_END_S = 5.0
 # Returns the greatest magnitude of a setting for the parameters of all units.
 LimitOf = Callable[[Any], float]
 # Makes the unit of a node: its name, the wiring, configuration files, what else was given by name.

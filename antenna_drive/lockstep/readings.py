@@ -28,6 +28,11 @@ _FLOAT64 = struct.Struct('<4sd')
 _CLOCK = struct.Struct('<4siI')
 
 
+def steps_between(rate_hz: float, step_s: float) -> int:
+    """Return after how many steps of `step_s` [s] something is due at a rate, at least one."""
+    return max(1, round(1.0 / (rate_hz * step_s)))
+
+
 class Readings:
     """Publish `<node>/<signal>` every few steps, and `clock` if the node owns the time."""
 
@@ -64,7 +69,7 @@ class Readings:
 
     def every(self, step_s: float) -> int:
         """Return after how many steps of `step_s` [s] the next readings are published."""
-        return max(1, round(1.0 / (self.rate_hz * step_s))) if self.rate_hz > 0.0 else 0
+        return steps_between(self.rate_hz, step_s) if self.rate_hz > 0.0 else 0
 
     def publish(self, step: int, step_s: float, outputs: FloatArray) -> None:
         """Publish the readings of a step."""
