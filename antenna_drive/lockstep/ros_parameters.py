@@ -145,6 +145,13 @@ class Overrides:
             raise ParameterError(f'{name}: {given!r} given, allowed is a list of texts')
         return [text for text in texts if text]
 
+    def text(self, name: str, default: str = '') -> str:
+        """Return the text given for a parameter, or its default; raise as `names` does."""
+        given = self.names(name, [default])
+        if len(given) > 1:
+            raise ParameterError(f'{name}: {given!r} given, allowed is one text')
+        return ''.join(given)
+
     def rest(self) -> dict[str, Any]:
         """Return what has not been asked for."""
         return {key: value for key, value in self._values.items() if key not in self._asked}

@@ -6,29 +6,28 @@ from collections.abc import Sequence
 from datetime import datetime
 import math
 from pathlib import Path
-import signal
 import time
-from types import FrameType
 from typing import Any
 
 from antenna_drive.emulator.unit import FloatArray
 from antenna_drive.emulator.wiring import OUTPUTS
-from antenna_drive.lockstep.entry import ros_node
+from antenna_drive.lockstep.entry import ros_node, stopped_by_signals
 from antenna_drive.lockstep.frame import two_of_one_name
 from antenna_drive.lockstep.observer import Observer
+from antenna_drive.lockstep.ros_parameters import Overrides
 from antenna_drive.lockstep.starting import Absence
 from antenna_drive.recording.bag_writer import SPLIT_S
 from antenna_drive.recording.recorder import RunRecorder
 from antenna_drive.recording.sheet import load_sheet
-from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
-from simgap.errors import UserError
+from simgap.inputs.schema import Entry
 from simgap.logs.channel import RecordingError
 
 NAME = 'recorder'
 OK, FAILED = 0, 1
 # How long a new run may take to send its configuration before a warning [s].
 _PATIENCE_S = 5.0
+_TIME = Entry('s', 0.0)
 
 
 def run(arguments: Sequence[str]) -> int:
@@ -40,25 +39,8 @@ def run(arguments: Sequence[str]) -> int:
 
     Raises UserError: wrong arguments, an existing target, a wrong test sheet.
     """
-    with ros_node(NAME, arguments, 'out:=my_run', undeclared=False) as node:
+    with ros_node(NAME, arguments, 'out:=my_run') as node:
         return _RecorderNode(node).spin()
-
-
-def _text(node: Node, name: str, default: str) -> str:
-    """Return a parameter that is a text."""
-    given = node.declare_parameter(name, default, ParameterDescriptor(dynamic_typing=True)).value
-    if not isinstance(given, str):
-        raise UserError(f'{name}: {given!r} given, allowed is a text')
-    return given
-
-
-def _seconds(node: Node, name: str, default: float, description: str) -> float | None:
-    """Return a parameter that is a time [s]; None for 0."""
-    given: Any = node.declare_parameter(name, default, ParameterDescriptor(
-        description=f'{description} [s]', dynamic_typing=True)).value
-    if isinstance(given, bool) or not isinstance(given, (int, float)) or not given >= 0.0:
-        raise UserError(f'{name}: {given!r} given, allowed is a time in seconds, 0 or more')
-    return float(given) or None
 
 
 class _RecorderNode:
@@ -66,31 +48,26 @@ class _RecorderNode:
 
     def __init__(self, node: Node) -> None:
         self._log = node.get_logger()
-        default = f'recording_{datetime.now():%Y-%m-%d_%H-%M-%S}'
-        out, sheet = _text(node, 'out', default), _text(node, 'sheet', '')
-        sync_s = _seconds(node, 'sync', 0.0, 'after how long the disk is made to hold what was '
-                          'written, 0: at the end of each storage file')
-        split_s = _seconds(node, 'split', SPLIT_S, 'after how long the next storage file begins, '
-                           '0: never')
+        overrides = Overrides(node)
+        out = overrides.text('out', f'recording_{datetime.now():%Y-%m-%d_%H-%M-%S}')
+        sheet = overrides.text('sheet')
+        sync_s = overrides.number('sync', _TIME, 0.0)  # 0: at the end of each storage file
+        split_s = overrides.number('split', _TIME, SPLIT_S)  # 0: never
+        overrides.check_all_known(('out', 'sheet', 'sync', 'split'))
         self._recorder = RunRecorder(
             out, {f'{unit}/{s.name}': s.unit for unit, own in OUTPUTS.items() for s in own},
-            load_sheet(Path(sheet)) if sheet else None, sync_s=sync_s,
+            load_sheet(Path(sheet)) if sheet else None, sync_s=sync_s or None,
             split_s=split_s or math.inf, recorded_by=NAME)
         self._failed = False  # in this run
         self._ever_failed = False
-        self._stop = False
         self._told_lost = 0
         self._told_refused = 0
         self._told_doubled: set[str] = set()
         self._ask_by = math.inf
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, self._end)
+        self._stop = stopped_by_signals()
         self._observer = Observer(node, self._step, on_begin=self._begin,
                                   on_change=self._recorder.told)
         self._absence = Absence(node, self._observer.publishers)
-
-    def _end(self, number: int, frame: FrameType | None) -> None:
-        self._stop = True
 
     def spin(self) -> int:
         """Record until told to stop; return the exit code."""
@@ -149,4 +126,4 @@ class _RecorderNode:
             self._ask_by = math.inf
             if not self._recorder.knows_configuration:
                 self._log.warning('not every node tells its parameters: the bag lacks them')
-        return self._stop
+        return self._stop.is_set()
