@@ -109,13 +109,14 @@ class Observer(Follower):
         """Follow the drive until `until()` is true; it is asked every 0.1 s and at each step."""
         while not until():
             came = self._take()
+            self.idle = self.idle and not came
             for step in self.steps():
                 self._hand_on(step)
                 if until():
                     return
             self._tell()
-            self.idle = not came and not self._link.wait(tuple(self.lengths), _LONGEST_WAIT_S)
             if not came:
+                self.idle = not self._link.wait(tuple(self.lengths), _LONGEST_WAIT_S)
                 time.sleep(_NAP_S)
 
     def finish(self) -> None:
