@@ -17,7 +17,6 @@ import math
 import os
 from pathlib import Path
 import platform
-import re
 import shutil
 import sys
 import tempfile
@@ -27,6 +26,8 @@ from typing import Any
 from antenna_drive import __version__
 from antenna_drive.remedies import ROS_REMEDY
 from antenna_drive.ros_releases import release_of, wheels
+from packaging.requirements import Requirement
+from packaging.specifiers import SpecifierSet
 import simgap
 from simgap.command.remedies import REMEDIES
 from simgap.errors import one_line, UserError
@@ -34,8 +35,6 @@ from simgap.errors import one_line, UserError
 OK, MISSING, BROKEN, NOTE = 'ok', 'missing', 'broken', 'note'
 # How long a message may take to come back to its own process [s].
 _LOOPBACK_S = 10.0
-_REQUIREMENT = re.compile(r'(?P<name>[\w.-]+)(\[[^\]]*\])?\s*\(?(?P<bounds>[^;()]*)\)?')
-_BOUND = re.compile(r'(>=|<|~=)\s*([\d.]+)')
 
 
 @dataclass(frozen=True)
@@ -78,7 +77,7 @@ def _libraries(part: str, *modules: str) -> Iterator[Finding]:
         yield _library(part, module, _bounds())
 
 
-def _library(part: str, module: str, bounds: Mapping[str, str]) -> Finding:
+def _library(part: str, module: str, bounds: Mapping[str, SpecifierSet]) -> Finding:
     """Import a library, look for its files, compare its version with what `bounds` ask for."""
     names = sorted(set(metadata.packages_distributions().get(module, ())))
     if gone := [name for name in names if _lacks_files(name)]:
@@ -100,8 +99,8 @@ def _library(part: str, module: str, bounds: Mapping[str, str]) -> Finding:
     name = next((name for name in names if name.lower() in bounds), ''.join(names[:1]))
     if not name:
         return Finding(part, module, OK, 'found')
-    version, wanted = metadata.version(name), bounds.get(name.lower(), '')
-    if not _within(version, wanted):
+    version, wanted = metadata.version(name), bounds.get(name.lower(), SpecifierSet())
+    if not wanted.contains(version, prereleases=True):
         return Finding(part, module, BROKEN, f'{version}, wanted {wanted}',
                        f"pip install '{name}{wanted}'")
     return Finding(part, module, OK, version)
@@ -117,7 +116,7 @@ def _lacks_files(name: str) -> bool:
                if not Path(str(distribution.locate_file(path))).exists())
 
 
-def _bounds() -> Mapping[str, str]:
+def _bounds() -> Mapping[str, SpecifierSet]:
     """Return the versions that this package asks for, by distribution."""
     try:
         return _read_bounds(metadata.requires('antenna_drive') or ())
@@ -125,27 +124,12 @@ def _bounds() -> Mapping[str, str]:
         return {}
 
 
-def _read_bounds(required: Iterable[str]) -> dict[str, str]:
-    found: dict[str, str] = {}
-    for text in required:
-        if match := _REQUIREMENT.match(text):
-            found.setdefault(match['name'].lower(), match['bounds'].replace(' ', ''))
+def _read_bounds(required: Iterable[str]) -> dict[str, SpecifierSet]:
+    """Return the versions that requirements ask for, by distribution; the first of each counts."""
+    found: dict[str, SpecifierSet] = {}
+    for item in map(Requirement, required):
+        found.setdefault(item.name.lower(), item.specifier)
     return found
-
-
-def _within(version: str, bounds: str) -> bool:
-    here = _numbers(version)
-    for sign, bound in _BOUND.findall(bounds):
-        other = _numbers(bound)
-        if sign in ('>=', '~=') and here < other or sign == '<' and here >= other:
-            return False
-        if sign == '~=' and here[:len(other) - 1] != other[:-1]:
-            return False
-    return True
-
-
-def _numbers(version: str) -> tuple[int, ...]:
-    return tuple(map(int, re.findall(r'\d+', version.partition('+')[0])[:3]))
 
 
 def _physics() -> Iterator[Finding]:
@@ -191,7 +175,7 @@ def _ros() -> Iterator[Finding]:
                       'make room: without it messages go through the network stack')
 
 
-def _release() -> tuple[str, Mapping[str, str]]:
+def _release() -> tuple[str, Mapping[str, SpecifierSet]]:
     """Return which ROS 2 is used, and what its wheels are held to where it is of wheels."""
     if distribution := os.environ.get('ROS_DISTRO'):
         return f'{distribution}, sourced', {}

