@@ -62,11 +62,6 @@ def _begin_log(path: Path, problem: CalibrationProblem, seed: int) -> list[FitCa
     return candidates
 
 
-def read_log(path: Path) -> list[FitCandidate]:
-    """Return the candidates of any search's log; UserError if it is none."""
-    return _read_log(path)[1]
-
-
 def _read_log(path: Path) -> tuple[dict[str, Any], list[FitCandidate]]:
     """Return the head of a log and its candidates, without a line that was cut short."""
     try:

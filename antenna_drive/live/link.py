@@ -55,6 +55,7 @@ class DriveLink:
 
     history : the signals of the last minute
     settings : the parameters of each unit as they are in force
+    reports : what each node said last of itself, and when
     twins : those that report in the same ROS 2 domain
     """
 
@@ -72,7 +73,7 @@ class DriveLink:
         self._own: dict[str, dict[str, Any]] = {unit: {} for unit in _UNITS}
         self._changes: deque[dict[str, Any]] = deque(maxlen=_REMEMBERED)
         self._count = 0
-        self._reports: dict[str, dict[str, Any]] = {}
+        self.reports: dict[str, dict[str, Any]] = {}
         self._listen()
         self.twins = Twins(self._node, board)
         self._clients: dict[tuple[str, str], Any] = {
@@ -136,7 +137,7 @@ class DriveLink:
             if unit is None:
                 self.twins.take(status)
             else:
-                self._reports[unit] = {
+                self.reports[unit] = {
                     'level': ord(status.level), 'message': status.message[:300],
                     'values': {item.key[:80]: item.value[:200] for item in status.values[:40]},
                     'heard': time.monotonic()}
@@ -146,15 +147,11 @@ class DriveLink:
         space, _, name = full.rpartition('/')
         return name if space == self.namespace and name in OUTPUTS else None
 
-    def forget_reports(self) -> None:
-        """Forget what nodes said that have been ended."""
-        self._reports = {}
-
     def nodes(self) -> dict[str, Any]:
         """Return what each node said last of itself, and how long ago [s]."""
         now = time.monotonic()
         return {unit: {**report, 'heard': now - report['heard']}
-                for unit, report in dict(self._reports).items()}
+                for unit, report in dict(self.reports).items()}
 
     def _poll(self) -> None:
         told = None

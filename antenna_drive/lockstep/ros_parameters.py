@@ -166,7 +166,8 @@ class Overrides:
 def declare(node: Node, settings: Settings) -> None:
     """Declare every setting with its unit, range and meaning; constants as read-only."""
     for name, (entry, value) in settings.items():
-        node.declare_parameter(name, _ros_value(value), describe(entry), ignore_override=True)
+        node.declare_parameter(name, list(value) if isinstance(value, tuple) else value,
+                               describe(entry), ignore_override=True)
 
 
 def declare_names(node: Node, name: str, value: Sequence[str], description: str) -> None:
@@ -237,7 +238,3 @@ def _plain(value: Any) -> Any:
     if value is None or isinstance(value, (bool, int, float, str)):
         return value
     return list(value)
-
-
-def _ros_value(value: Value) -> Any:
-    return list(value) if isinstance(value, tuple) else value

@@ -55,10 +55,6 @@ class Storage:
     messages: int = 0
     unpacked: int = 0
 
-    def begin_file(self) -> None:
-        """Forget the numbers of types and topics: each file has its own."""
-        self.schemas, self.topics = {}, {}
-
     def take(self, record: object) -> None:
         """Take in one record of a file."""
         if isinstance(record, Header):
@@ -268,7 +264,7 @@ def read_storage(path: Path, storage: Storage) -> None:
         raise DamageError(f'{path}: {error.strerror}') from error
     except OSError as error:
         raise RecordingError(f'{path}: {error.strerror}') from error
-    storage.begin_file()
+    storage.schemas, storage.topics = {}, {}  # each file has numbers of its own
     before = storage.messages
     count: int | None = None
     with file:
