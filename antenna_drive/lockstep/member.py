@@ -7,7 +7,6 @@ A member is a plain state machine, as is the `Conductor`, who owns the run: fram
 `receive`, outputs to be published come out of `go_on`. Others carry the frames.
 """
 
-from array import array
 from collections.abc import Collection, Mapping, Sequence
 
 from antenna_drive.emulator.unit import FloatArray, Signal, Unit
@@ -89,9 +88,7 @@ class Member:
         self._announced: Frame | None = None
         self._announced_at = 0
         self._deceived_at: int | None = None  # the step at which a frame was last found false
-        # one memory: a numpy array is slow to write single numbers to
-        self._numbers = array('d', bytes(2 * 8 * len(columns)))
-        self._inputs = np.asarray(self._numbers).reshape(-1, 2)
+        self._inputs = np.zeros((len(columns), 2))
         self.packed = bytes(self.layout.packed_size)
         self._shape = (len(unit.outputs), 2)
         self._reads_itself = any(peer == unit.name for peer, _ in columns)
@@ -219,15 +216,10 @@ class Member:
         return self._checked(self.unit.start(step_s))
 
     def _advance(self) -> FloatArray | None:
-        slot = self.step % DEPTH
-        numbers = self._numbers
-        place = 0
-        for slots, column in self._read:
-            frame = slots[slot]
+        for row, (slots, column) in zip(self._inputs, self._read):
+            frame = slots[self.step % DEPTH]
             assert frame is not None
-            numbers[place] = frame[column]
-            numbers[place + 1] = frame[column + 1]
-            place += 2
+            row[:] = frame[column:column + 2]
         outputs = self.unit.step(self.step, self._inputs)
         self.inbox.advance()
         self.step += 1
