@@ -231,10 +231,9 @@ class Member:
         if outputs.shape != self._shape:
             self.fault = f'outputs of shape {outputs.shape}, wanted {self._shape}'
         else:
-            packed = outputs.tobytes()
-            values = self.layout.unpack(packed)
+            values = outputs.ravel().tolist()
             if all_finite(values):
-                self.packed = packed
+                self.packed = outputs.tobytes()
                 if self._reads_itself:
                     self._own_slots[self.step % DEPTH] = (
                         self.run, float(self.step), self.step_s, self.sender, *values)

@@ -8,7 +8,7 @@ from typing import Any
 
 from antenna_drive.emulator.unit import FloatArray, Signal
 from antenna_drive.lockstep.compiled_loop import TIME
-from antenna_drive.lockstep.frame import READING_PREFIX
+from antenna_drive.lockstep.frame import CDR_LITTLE_ENDIAN
 from antenna_drive.lockstep.ros_link import remembered
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
@@ -75,10 +75,10 @@ class Readings:
         """Publish the readings of a step."""
         values = outputs[:, 0].tolist()
         for row, scale, publisher in self._rows:
-            publisher.publish(_FLOAT64.pack(READING_PREFIX, scale * values[row]))
+            publisher.publish(_FLOAT64.pack(CDR_LITTLE_ENDIAN, scale * values[row]))
         if self._clock is not None:
             seconds, nanoseconds = divmod(round(step * step_s * 1e9), 1_000_000_000)
-            self._clock.publish(_CLOCK.pack(READING_PREFIX, seconds, nanoseconds))
+            self._clock.publish(_CLOCK.pack(CDR_LITTLE_ENDIAN, seconds, nanoseconds))
 
 
 class Commanded:
