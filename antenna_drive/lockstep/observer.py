@@ -117,7 +117,7 @@ class Observer(Follower):
             self._tell()
             if not came:
                 self.idle = not self._link.wait(tuple(self.lengths), _LONGEST_WAIT_S)
-                time.sleep(_NAP_S)
+            time.sleep(_NAP_S)
 
     def finish(self) -> None:
         """Hand on all that has come; nothing more is waited for."""
