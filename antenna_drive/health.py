@@ -77,7 +77,7 @@ def _libraries(part: str, *modules: str) -> Iterator[Finding]:
         yield _library(part, module, _bounds())
 
 
-def _library(part: str, module: str, bounds: Mapping[str, SpecifierSet]) -> Finding:
+def _library(part: str, module: str, bounds: Mapping[str, str]) -> Finding:
     """Import a library, look for its files, compare its version with what `bounds` ask for."""
     names = sorted(set(metadata.packages_distributions().get(module, ())))
     if gone := [name for name in names if _lacks_files(name)]:
@@ -99,8 +99,8 @@ def _library(part: str, module: str, bounds: Mapping[str, SpecifierSet]) -> Find
     name = next((name for name in names if name.lower() in bounds), ''.join(names[:1]))
     if not name:
         return Finding(part, module, OK, 'found')
-    version, wanted = metadata.version(name), bounds.get(name.lower(), SpecifierSet())
-    if not wanted.contains(version, prereleases=True):
+    version, wanted = metadata.version(name), bounds.get(name.lower(), '')
+    if not SpecifierSet(wanted).contains(version, prereleases=True):
         return Finding(part, module, BROKEN, f'{version}, wanted {wanted}',
                        f"pip install '{name}{wanted}'")
     return Finding(part, module, OK, version)
@@ -116,7 +116,7 @@ def _lacks_files(name: str) -> bool:
                if not Path(str(distribution.locate_file(path))).exists())
 
 
-def _bounds() -> Mapping[str, SpecifierSet]:
+def _bounds() -> Mapping[str, str]:
     """Return the versions that this package asks for, by distribution."""
     try:
         return _read_bounds(metadata.requires('antenna_drive') or ())
@@ -124,11 +124,11 @@ def _bounds() -> Mapping[str, SpecifierSet]:
         return {}
 
 
-def _read_bounds(required: Iterable[str]) -> dict[str, SpecifierSet]:
+def _read_bounds(required: Iterable[str]) -> dict[str, str]:
     """Return the versions that requirements ask for, by distribution; the first of each counts."""
-    found: dict[str, SpecifierSet] = {}
+    found: dict[str, str] = {}
     for item in map(Requirement, required):
-        found.setdefault(item.name.lower(), item.specifier)
+        found.setdefault(item.name.lower(), str(item.specifier))
     return found
 
 
@@ -175,7 +175,7 @@ def _ros() -> Iterator[Finding]:
                       'make room: without it messages go through the network stack')
 
 
-def _release() -> tuple[str, Mapping[str, SpecifierSet]]:
+def _release() -> tuple[str, Mapping[str, str]]:
     """Return which ROS 2 is used, and what its wheels are held to where it is of wheels."""
     if distribution := os.environ.get('ROS_DISTRO'):
         return f'{distribution}, sourced', {}
