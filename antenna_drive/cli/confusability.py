@@ -80,12 +80,17 @@ def run(arguments: argparse.Namespace) -> int:
     whole = next(iter(found.values()))
     lines = ['smallest detectable size, and the effects that look alike']
     for i, effect in enumerate(whole.effects):
-        size = whole.detectable[i]
-        said = (spoken.size(size, whole.units[i], ' %') if np.isfinite(size)
-                else 'does not show')
-        lines.append(f'  {effect:36s} {said:24s} ' + ', '.join(passing_for(whole, i, 3)))
+        lines.append(f'  {effect:36s} {_size(whole.detectable[i], whole.units[i]):24s} '
+                     + ', '.join(passing_for(whole, i, 3)))
     for name, item in found.items():
         lines.append(f'{name}: {100.0 * separated(item):.1f} % of all pairs of effects are '
                      f'separated; {len(groups(item))} groups are not')
     give(result, arguments.json, '\n'.join(lines))
     return 0
+
+
+def _size(size: float, unit: str) -> str:
+    """Return a detectable size as people say it."""
+    if not np.isfinite(size):
+        return 'does not show'
+    return spoken.size(size, unit, ' %')
