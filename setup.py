@@ -99,6 +99,8 @@ setup(
         # read the old one's cache: a new series is let in once the suite has passed with it.
         'numba >= 0.58, < 0.69',
         'PyYAML >= 5.4',
+        # the doctor reads what is asked for, as pip does
+        'packaging >= 21',
         # the pages: what a recording says is escaped by a library that is known for it
         'Jinja2 >= 3.0',
         # a diagnosis makes its fits side by side, each with a linear algebra of one thread

@@ -340,9 +340,10 @@ def _keep(folder: Path, machine: FleetMachine, key: str, found: Files) -> dict[s
 
 def _failed(machine: FleetMachine, said: str) -> dict[str, Any]:
     lines = said.strip().splitlines() or ['nothing said']
-    return {'machine': machine.name, 'recordings': [path.name for path in machine.recordings],
-            'verdict': None, 'sentence': '', 'effects': [], 'probability': None, 'explained': None,
-            'explained_ci95': None, 'confusable': [], 'notes': [], 'seconds': None, 'page': None,
+    nothing: dict[str, Any] = {
+        'verdict': None, 'which': [], 'how_far': {'explained_fraction': {'value': None}},
+        'confusable': [], 'notes': [], 'seconds': None}
+    return {**row_of(machine, nothing), 'page': None,
             'failure': one_line(lines[-1].removeprefix('antenna-drive diagnose: '), 200)}
 
 

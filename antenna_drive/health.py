@@ -17,7 +17,6 @@ import math
 import os
 from pathlib import Path
 import platform
-import re
 import shutil
 import sys
 import tempfile
@@ -27,6 +26,8 @@ from typing import Any
 from antenna_drive import __version__
 from antenna_drive.remedies import ROS_REMEDY
 from antenna_drive.ros_releases import release_of, wheels
+from packaging.requirements import Requirement
+from packaging.specifiers import SpecifierSet
 import simgap
 from simgap.command.remedies import REMEDIES
 from simgap.errors import one_line, UserError
@@ -34,8 +35,6 @@ from simgap.errors import one_line, UserError
 OK, MISSING, BROKEN, NOTE = 'ok', 'missing', 'broken', 'note'
 # How long a message may take to come back to its own process [s].
 _LOOPBACK_S = 10.0
-_REQUIREMENT = re.compile(r'(?P<name>[\w.-]+)(\[[^\]]*\])?\s*\(?(?P<bounds>[^;()]*)\)?')
-_BOUND = re.compile(r'(>=|<|~=)\s*([\d.]+)')
 
 
 @dataclass(frozen=True)
@@ -101,7 +100,7 @@ def _library(part: str, module: str, bounds: Mapping[str, str]) -> Finding:
     if not name:
         return Finding(part, module, OK, 'found')
     version, wanted = metadata.version(name), bounds.get(name.lower(), '')
-    if not _within(version, wanted):
+    if not SpecifierSet(wanted).contains(version, prereleases=True):
         return Finding(part, module, BROKEN, f'{version}, wanted {wanted}',
                        f"pip install '{name}{wanted}'")
     return Finding(part, module, OK, version)
@@ -126,26 +125,11 @@ def _bounds() -> Mapping[str, str]:
 
 
 def _read_bounds(required: Iterable[str]) -> dict[str, str]:
+    """Return the versions that requirements ask for, by distribution; the first of each counts."""
     found: dict[str, str] = {}
-    for text in required:
-        if match := _REQUIREMENT.match(text):
-            found.setdefault(match['name'].lower(), match['bounds'].replace(' ', ''))
+    for item in map(Requirement, required):
+        found.setdefault(item.name.lower(), str(item.specifier))
     return found
-
-
-def _within(version: str, bounds: str) -> bool:
-    here = _numbers(version)
-    for sign, bound in _BOUND.findall(bounds):
-        other = _numbers(bound)
-        if sign in ('>=', '~=') and here < other or sign == '<' and here >= other:
-            return False
-        if sign == '~=' and here[:len(other) - 1] != other[:-1]:
-            return False
-    return True
-
-
-def _numbers(version: str) -> tuple[int, ...]:
-    return tuple(map(int, re.findall(r'\d+', version.partition('+')[0])[:3]))
 
 
 def _physics() -> Iterator[Finding]:

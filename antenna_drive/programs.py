@@ -3,6 +3,7 @@
 """How the programs of the drive begin, and how they end with the process that started them."""
 
 from collections.abc import Callable, Sequence
+from importlib import import_module
 import os
 from pathlib import Path
 import signal
@@ -11,16 +12,24 @@ import sys
 from simgap.command.programs import answered, OK, PARENT
 
 
-def run_program(name: str, description: str, act: Callable[[list[str]], int],
+def run_program(name: str, description: str, act: Callable[[list[str]], int] | str,
                 args: Sequence[str] | None = None) -> int:
-    """Run a program or print its help; return its exit code. The arguments exclude its name."""
+    """
+    Run a program or print its help; return its exit code.
+
+    name, description : of the program, for people
+    act : what it does with its arguments, or the module whose `run` does it; without ROS 2 the
+        import of the module is what says so
+    args : command line without the program's name; None for the process's own
+    """
+    end_with_starter()
     arguments = list(sys.argv[1:] if args is None else args)
 
     def run() -> int:
         if '-h' in arguments or '--help' in arguments:
             print(description.strip())
             return OK
-        return act(arguments)
+        return (import_module(act).run if isinstance(act, str) else act)(arguments)
 
     return answered(name, run)
 

@@ -12,7 +12,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
 
-from antenna_drive.article.experiments import DriveExperiment, experiments
+from antenna_drive.article.experiments import experiments
 from antenna_drive.emulator.run import FINE_STEP, Run, simulate
 import numpy as np
 
@@ -31,12 +31,10 @@ class Distance:
     share: float
 
 
-@lru_cache(maxsize=8)
-def _reference(name: str) -> Run:
-    return _sampled(experiments()[name], FINE_STEP)
-
-
-def _sampled(experiment: DriveExperiment, step_s: float) -> Run:
+# the references of all experiments, and some more runs
+@lru_cache(maxsize=32)
+def _sampled(name: str, step_s: float) -> Run:
+    experiment = experiments()[name]
     return simulate(experiment.drive(), experiment.duration, step_s,
                     every=round(_GRID / step_s))
 
@@ -50,8 +48,7 @@ def distances(step_s: float, names: Iterable[str] | None = None) -> list[Distanc
     """
     found = []
     for name in names or experiments():
-        reference = _reference(name)
-        run = _sampled(experiments()[name], step_s)
+        reference, run = _sampled(name, FINE_STEP), _sampled(name, step_s)
         for signal in run.names:
             if signal.endswith(_LEFT_OUT):
                 continue

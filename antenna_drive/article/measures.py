@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 import math
-from typing import Any, Protocol
+from typing import Any
 
 from antenna_drive.article import readings
 from antenna_drive.article.experiments import (
@@ -70,27 +70,22 @@ def article_experiments() -> dict[str, DriveExperiment]:
     return {**experiments(), **filter_variants(), step.name: step}
 
 
-class Measure(Protocol):
-    """A figure: its name, its unit and its value for a parameter set."""
+@dataclass(frozen=True)
+class Measure:
+    """A figure."""
 
-    @property
-    def name(self) -> str:
-        """Return its name, as 'T4a.overshoot'."""
-
-    @property
-    def unit(self) -> str:
-        """Return its unit."""
+    name: str  # as 'T4a.overshoot'
+    unit: str
 
     def value(self, results: Results) -> float:
         """Return the figure that a parameter set gives."""
+        raise NotImplementedError
 
 
 @dataclass(frozen=True)
-class Readout:
+class Readout(Measure):
     """A figure taken from the run of one experiment."""
 
-    name: str  # as the unit, for people
-    unit: str
     experiment: str  # the run to read
     kind: str  # how it is evaluated, a key of `readings.KINDS`
     signal: Mapping[str, float]  # weight of each signal in the sum
@@ -101,7 +96,6 @@ class Readout:
     scale: float = 1.0  # the figure is multiplied by it
 
     def value(self, results: Results) -> float:
-        """Return the figure that a parameter set gives."""
         value = self._read(results.run(self.experiment))
         if self.compared_with is not None:
             value = value / self._read(results.run(self.compared_with)) - 1.0
@@ -117,11 +111,9 @@ def weighted(run: Run, signal: Mapping[str, float]) -> FloatArray:
 
 
 @dataclass(frozen=True)
-class Trend:
+class Trend(Measure):
     """The largest violation of a trend by figures in order; below zero it holds strictly."""
 
-    name: str  # as the unit, for people
-    unit: str
     of: tuple[Measure, ...]  # the figures in order
     kind: str  # 'falls', or 'falls then rises'
 
@@ -131,16 +123,13 @@ class Trend:
 
 
 @dataclass(frozen=True)
-class ModelFigure:
+class ModelFigure(Measure):
     """A figure that does not come from the run of an experiment."""
 
-    name: str  # as the unit, for people
-    unit: str
     of: Callable[[Drive], float]  # gives the figure of a drive
     circuit: str = OLD_CIRCUIT  # name of the circuit that the drive has
 
     def value(self, results: Results) -> float:
-        """Return the figure that a parameter set gives."""
         return self.of(results.drives[self.circuit])
 
 

@@ -81,11 +81,8 @@ def _bias_at_rest(circuit: str, share: float, drive: Drive) -> float:
     return bias_at_rest(loaded_axis(drive, circuit, share))
 
 
-class _FadeOutRatio:
+class _FadeOutRatio(Measure):
     """How much wider the new circuit's fade-out is than the old one's, on the loaded axis."""
-
-    name = 'T5.fade_out_ratio'
-    unit = '1'
 
     def value(self, results: Results) -> float:
         """Return the ratio of the loads over which the bias fades out."""
@@ -99,7 +96,8 @@ class _FadeOutRatio:
 
 def loaded_axis_measures() -> dict[str, Measure]:
     """Return the figures of the loaded axis, by name."""
-    figures: dict[str, Measure] = {_FadeOutRatio.name: _FadeOutRatio()}
+    ratio = _FadeOutRatio('T5.fade_out_ratio', '1')
+    figures: dict[str, Measure] = {ratio.name: ratio}
     for name, circuit in CIRCUITS.items():
         for share in SHARES:
             row = f'T5.{name}_{100.0 * share:.0f}'

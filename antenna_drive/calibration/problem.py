@@ -281,8 +281,7 @@ def _free(name: str, body: Any) -> Free:
     scale = table.get('scale', 'linear')
     if scale not in ('linear', 'log') or not low < high or (scale == 'log' and low <= 0.0):
         raise ParameterError(f'{key}: low {low:g}, high {high:g}, scale {quoted(scale)} given, '
-                             'allowed '
-                             'is low below high, scale linear or, above zero, log')
+                             'allowed is low below high, scale linear or, above zero, log')
     return Free(name, low, high, scale == 'log', entry.unit)
 
 
@@ -328,8 +327,7 @@ def _figure(name: str, body: Any, experiments: set[str]) -> Readout:
     signal = table.get('signal')
     if not isinstance(signal, dict) or not signal:
         raise ParameterError(f'{key}.signal: {quoted(signal)} given, allowed is a mapping of '
-                             'signals '
-                             'to weights')
+                             'signals to weights')
     return Readout(name, str(table.get('unit', '1')), str(table['experiment']),
                    str(table['kind']),
                    {str(part): _number(f'{key}.signal.{part}', weight)

@@ -41,8 +41,7 @@ _DIGITS = 7
 
 
 def report(problem: CalibrationProblem, found: SearchResult, trade_offs: Sequence[str] = (),
-           progress: Callable[[float], None] | None = None,
-           also: Sequence[FitCandidate] = ()) -> dict[str, Any]:
+           progress: Callable[[float], None] | None = None) -> dict[str, Any]:
     """
     Report the best candidate and how well its parameters are determined.
 
@@ -50,7 +49,6 @@ def report(problem: CalibrationProblem, found: SearchResult, trade_offs: Sequenc
     found : result of the search
     trade_offs : target figures for which to show the cost of the other targets
     progress : called with the share that is done, 0 to 1
-    also : candidates of other searches with the same figures, for the trade-offs
 
     Returns a mapping of cost, candidates, targets, parameters, correlations, flat_directions,
     trade_offs.
@@ -86,7 +84,7 @@ def report(problem: CalibrationProblem, found: SearchResult, trade_offs: Sequenc
              'profile': _profile(item, i, best, slopes, evaluated)}
             for i, (item, share) in enumerate(zip(problem.free, best.shares, strict=True))],
         **_common([item.name for item in problem.free], correlation, flat),
-        'trade_offs': {figure: _trade_off(problem, (*found.candidates, *also), figure)
+        'trade_offs': {figure: _trade_off(problem, found.candidates, figure)
                        for figure in trade_offs},
     }
 

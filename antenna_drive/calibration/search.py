@@ -51,7 +51,7 @@ def _begin_log(path: Path, problem: CalibrationProblem, seed: int) -> list[FitCa
     if not path.exists():
         path.write_text(json.dumps(head) + '\n', encoding='utf-8')
         return []
-    found, candidates = _read_log(path)
+    found, candidates = read_log(path)
     if found != head:
         raise UserError(f'{path}: belongs to another search (targets, start or seed differ), give '
                         '--log another file or remove it')
@@ -62,13 +62,8 @@ def _begin_log(path: Path, problem: CalibrationProblem, seed: int) -> list[FitCa
     return candidates
 
 
-def read_log(path: Path) -> list[FitCandidate]:
-    """Return the candidates of any search's log; UserError if it is none."""
-    return _read_log(path)[1]
-
-
-def _read_log(path: Path) -> tuple[dict[str, Any], list[FitCandidate]]:
-    """Return the head of a log and its candidates, without a line that was cut short."""
+def read_log(path: Path) -> tuple[dict[str, Any], list[FitCandidate]]:
+    """Return head and candidates of any search's log, but for a line cut short; or UserError."""
     try:
         lines = path.read_text(encoding='utf-8').splitlines(keepends=True)
         head = json.loads(lines[0])

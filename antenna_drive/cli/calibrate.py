@@ -18,7 +18,7 @@ from typing import Any
 
 from antenna_drive.calibration.problem import read_problem
 from antenna_drive.calibration.report import configuration, report
-from antenna_drive.calibration.search import read_log, search
+from antenna_drive.calibration.search import search
 from antenna_drive.cli.options import add_worker_options
 from antenna_drive.parameters.files import config_dir
 from simgap.command.output import add_json_option, check_options, give, Progress, replaced
@@ -44,15 +44,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--trade-off', metavar='FIGURE', nargs='+', default=[],
                         help='show the least cost of the other targets by the level of each '
                              'FIGURE')
-    parser.add_argument('--also', metavar='LOG', nargs='+', type=Path, default=[],
-                        help='logs of earlier searches, used for the trade-offs')
     add_worker_options(parser, 1)
     add_json_option(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
     check_options(arguments, jobs=Entry('', 1, whole=True))
-    also = [candidate for path in arguments.also for candidate in read_log(path)]
     shipped = config_dir() / 'calibration' / f'{arguments.targets}.yaml'
     by_name = shipped.is_file() and not Path(arguments.targets).exists()
     problem = read_problem(shipped if by_name else arguments.targets, [arguments.start])
@@ -63,7 +60,7 @@ def run(arguments: argparse.Namespace) -> int:
     with replaced(arguments.out) as stream:
         stream.write(configuration(problem, found.best.shares, arguments.start).encode())
     with Progress('uncertainties', 1.0) as shown:
-        fitted = report(problem, found, arguments.trade_off, shown.update, also)
+        fitted = report(problem, found, arguments.trade_off, shown.update)
     give(fitted, arguments.json, _text(fitted))
     return OK if all(item['met'] for item in fitted['targets']) else NEGATIVE
 

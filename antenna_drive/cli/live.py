@@ -58,7 +58,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help='serve signals and parameters to Foxglove as well, on this machine; '
                              f'PORT is {_FOXGLOVE_PORT} if not given, 0: any free one; needs '
                              'foxglove-sdk')
-    parser.add_argument('--open', action='store_true', help='open the page in the browser')
 
 
 def run(args: argparse.Namespace) -> int:
@@ -86,4 +85,4 @@ def run(args: argparse.Namespace) -> int:
         join=args.join, namespace=args.namespace, experiment=experiment,
         config=tuple(args.config), parameters=parse_settings(args.settings),
         pace=1.0 if args.pace is None else args.pace, out=args.out.resolve(), port=args.port,
-        host=args.host, token=args.token, open_page=args.open, foxglove=args.foxglove))
+        host=args.host, token=args.token, foxglove=args.foxglove))

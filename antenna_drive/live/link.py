@@ -8,7 +8,7 @@ wakes for each. Services and everything else are served in a second thread.
 """
 
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import partial
 import json
 import os
@@ -20,7 +20,7 @@ from antenna_drive.emulator.wiring import OUTPUTS, TEST_SIGNAL
 from antenna_drive.live.asking import ask
 from antenna_drive.live.board import Board
 from antenna_drive.live.history import History
-from antenna_drive.live.parameter_table import Description, table
+from antenna_drive.live.parameter_table import entry_of
 from antenna_drive.live.twins import Twins
 from antenna_drive.lockstep.changes import CHANGES, read_record, SETTINGS
 from antenna_drive.lockstep.entry import own_node
@@ -55,6 +55,7 @@ class DriveLink:
 
     history : the signals of the last minute
     settings : the parameters of each unit as they are in force
+    reports : what each node said last of itself, and when
     twins : those that report in the same ROS 2 domain
     """
 
@@ -72,7 +73,7 @@ class DriveLink:
         self._own: dict[str, dict[str, Any]] = {unit: {} for unit in _UNITS}
         self._changes: deque[dict[str, Any]] = deque(maxlen=_REMEMBERED)
         self._count = 0
-        self._reports: dict[str, dict[str, Any]] = {}
+        self.reports: dict[str, dict[str, Any]] = {}
         self._listen()
         self.twins = Twins(self._node, board)
         self._clients: dict[tuple[str, str], Any] = {
@@ -136,7 +137,7 @@ class DriveLink:
             if unit is None:
                 self.twins.take(status)
             else:
-                self._reports[unit] = {
+                self.reports[unit] = {
                     'level': ord(status.level), 'message': status.message[:300],
                     'values': {item.key[:80]: item.value[:200] for item in status.values[:40]},
                     'heard': time.monotonic()}
@@ -146,15 +147,11 @@ class DriveLink:
         space, _, name = full.rpartition('/')
         return name if space == self.namespace and name in OUTPUTS else None
 
-    def forget_reports(self) -> None:
-        """Forget what nodes said that have been ended."""
-        self._reports = {}
-
     def nodes(self) -> dict[str, Any]:
         """Return what each node said last of itself, and how long ago [s]."""
         now = time.monotonic()
         return {unit: {**report, 'heard': now - report['heard']}
-                for unit, report in dict(self._reports).items()}
+                for unit, report in dict(self.reports).items()}
 
     def _poll(self) -> None:
         told = None
@@ -190,8 +187,8 @@ class DriveLink:
         values = {name: _plain(value) for name, value in zip(names, got.values)}
         self.settings[unit].update(values)
         self._board.post(f'parameters {unit}', {
-            'unit': unit, 'entries': table([_description(item) for item in described.descriptors],
-                                           values)})
+            'unit': unit, 'entries': [entry_of(item, values[item.name])
+                                      for item in described.descriptors if item.name in values]})
 
     async def set(self, unit: str, values: Mapping[str, Any]) -> str:  # noqa: A003
         """
@@ -230,13 +227,3 @@ def _message(name: str, value: Any) -> ParameterMessage:
     if not isinstance(value, (bool, int, float, str, list, tuple)):
         raise UserError(f'{name}: {json.dumps(value)[:80]} given, allowed is a value')
     return Parameter(name, value=value).to_parameter_msg()
-
-
-def _description(given: Any) -> Description:
-    low: float | None = None
-    high: float | None = None
-    ranges: Sequence[Any] = [*given.floating_point_range, *given.integer_range]
-    for item in ranges:
-        low, high = float(item.from_value), float(item.to_value)
-    return Description(given.name, given.description, given.additional_constraints,
-                       given.read_only, low, high, bool(given.integer_range))

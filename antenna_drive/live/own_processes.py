@@ -65,7 +65,7 @@ class OwnDrive:
         return ''
 
     def stop(self) -> None:
-        """End the processes; takes up to five seconds."""
+        """End the processes; takes up to six seconds."""
         processes, self._processes = self._processes, None
         if processes is not None:
             processes.close()

@@ -2,9 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the page shows of a parameter, read from the descriptor that its node gives."""
 
-from collections.abc import Mapping, Sequence
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 _DEGREES = 180.0 / math.pi
 
@@ -22,62 +21,53 @@ _REACH = {'rad/s': math.radians(1.0), 'N m': 1e6, 's': 20.0, 'V': 20.0, '1/s': 1
 _CUT = 4.0
 
 
-class Description(NamedTuple):
-    """A descriptor in plain data."""
-
-    # the parameter, what it is, what is allowed (additional_constraints)
-    name: str
-    text: str
-    allowed: str
-    read_only: bool  # whether it is a constant while the drive runs
-    # the range, None if it has none
-    low: float | None = None
-    high: float | None = None
-    whole: bool = False  # whether only whole numbers are allowed
-
-
-def entry_of(described: Description, value: Any) -> dict[str, Any]:
+def entry_of(described: Any, value: Any) -> dict[str, Any]:
     """
     Return a parameter as the page shows it.
+
+    described : its ParameterDescriptor
+    value : in force, plain data
 
     Returns name, text, allowed, live; value in SI; `kind`: choice, number, list, flag or text;
     `unit` shown and `factor`, how many of it are one SI unit; for a choice `choices`; for a number
     `low` and `high`, which may be None, `from` and `to`, the reach of the slider, and `whole`; all
     numbers in SI.
     """
-    text, unit = _split(described)
+    text, unit = _split(described.description, described.additional_constraints)
     entry: dict[str, Any] = {
-        'name': described.name, 'text': text, 'allowed': described.allowed,
-        'live': not described.read_only, 'value': value, 'kind': _kind(described, value)}
+        'name': described.name, 'text': text, 'allowed': described.additional_constraints,
+        'live': not described.read_only, 'value': value,
+        'kind': _kind(described.additional_constraints, value)}
     if unit == _WAVEFORM_UNIT:
         unit = 'N m' if described.name.startswith(_TORQUE) else 'rad/s'
         entry['text'] = text.removesuffix(', rad/s or N m')
     entry['unit'], entry['factor'] = _SHOWN.get(unit, (unit, 1.0))
     if entry['kind'] == 'choice':
-        entry['choices'] = described.allowed.removeprefix('one of ').split(', ')
+        entry['choices'] = entry['allowed'].removeprefix('one of ').split(', ')
     elif entry['kind'] == 'number':
-        entry |= {'low': described.low, 'high': described.high, 'whole': described.whole}
-        entry['from'], entry['to'] = reach(described.low, described.high, unit or '1', value)
+        low, high = next(((float(item.from_value), float(item.to_value)) for item in (
+            *described.floating_point_range, *described.integer_range)), (None, None))
+        entry |= {'low': low, 'high': high, 'whole': bool(described.integer_range)}
+        entry['from'], entry['to'] = reach(low, high, unit or '1', value)
     return entry
 
 
-def _kind(described: Description, value: Any) -> str:
+def _kind(allowed: str, value: Any) -> str:
     if isinstance(value, bool):
         return 'flag'
     if isinstance(value, str):
-        return 'choice' if described.allowed.startswith('one of ') else 'text'
+        return 'choice' if allowed.startswith('one of ') else 'text'
     return 'number' if isinstance(value, (int, float)) else 'list'
 
 
-def _split(described: Description) -> tuple[str, str]:
+def _split(text: str, allowed: str) -> tuple[str, str]:
     """Return a description without the unit at its end, and the unit, '' for none."""
     # a symbol of docs/model.md stands in brackets too; only a unit is in what is allowed as well
-    body, bracket, rest = described.text.rpartition(' [')
+    body, bracket, rest = text.rpartition(' [')
     unit = rest.removesuffix(']')
-    if bracket and rest.endswith(']') and described.allowed.removesuffix(' or more').endswith(
-            f' {unit}'):
+    if bracket and rest.endswith(']') and allowed.removesuffix(' or more').endswith(f' {unit}'):
         return body, unit
-    return described.text, ''
+    return text, ''
 
 
 def reach(low: float | None, high: float | None, unit: str, value: float) -> tuple[float, float]:
@@ -87,8 +77,3 @@ def reach(low: float | None, high: float | None, unit: str, value: float) -> tup
     if most - least <= _CUT * wide:
         return least, most
     return max(least, -wide), min(most, wide)
-
-
-def table(described: Sequence[Description], values: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Return the entries of a node that has told these descriptors and values."""
-    return [entry_of(item, values[item.name]) for item in described if item.name in values]

@@ -11,7 +11,6 @@ import secrets
 import signal
 import sys
 from typing import Any
-import webbrowser
 
 from antenna_drive.live.board import Board
 from antenna_drive.live.link import DriveLink
@@ -36,7 +35,6 @@ class LiveOptions:
     port: int = 0
     host: str = ''
     token: str = ''
-    open_page: bool = False
     foxglove: int | None = None
 
 
@@ -100,8 +98,6 @@ async def _serve_session(options: LiveOptions, session: Session, ended: asyncio.
     print(f'{server.url}  shows {whose}; Ctrl-C ends it', flush=True)
     if foxglove is not None:
         print(f'{foxglove.url}  serves the same to Foxglove', flush=True)
-    if options.open_page:
-        webbrowser.open(server.url)
     waiting = asyncio.ensure_future(ended.wait())
     await asyncio.wait({waiting, looking}, return_when=asyncio.FIRST_COMPLETED)
     waiting.cancel()

@@ -162,7 +162,7 @@ class Session:
             if found.constants and own is not None:
                 self._tables.clear()
                 await asyncio.to_thread(own.stop)
-                self.link.forget_reports()
+                self.link.reports.clear()
                 own.start(name)
                 said = 'the drive is started again with the constants of this experiment'
             else:

@@ -57,7 +57,7 @@ class Conductor(Member):
 
     def receive(self, peer: str, frame: Frame) -> None:
         """Take in a frame or refuse it; note who is there."""
-        if self.inbox.accept(peer, frame) or not self._well_formed(peer, frame):
+        if not self._well_formed(peer, frame):
             return
         if self.run == NO_RUN:
             self._heard.setdefault(peer, 0.0)

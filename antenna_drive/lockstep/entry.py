@@ -20,7 +20,7 @@ from threading import Event
 from types import FrameType, MappingProxyType
 from typing import Any, TYPE_CHECKING
 
-from antenna_drive.programs import end_with_starter, run_program
+from antenna_drive.programs import run_program
 from simgap.command.programs import OK
 from simgap.errors import UserError
 
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 # A node's parameter: a test sheet that its unit plays.
 SHEET = 'sheet'
 # A node that has been asked to end has ended after this [s], whatever holds it.
-_END_S = 3.0
+_END_S = 5.0
 # Returns the greatest magnitude of a setting for the parameters of all units.
 LimitOf = Callable[[Any], float]
 # Makes the unit of a node: its name, the wiring, configuration files, what else was given by name.
@@ -133,7 +133,6 @@ def _run(default_name: str, make: MakeUnit, args: Sequence[str] | None, descript
          wiring: str = '', fed_by_topic: Mapping[str, LimitOf] = MappingProxyType({}),
          read_sheet: ReadSheet | None = None) -> int:
     ending = _Ending()
-    end_with_starter()
 
     def spin(node: Node) -> None:
         from antenna_drive.emulator.wiring import find
@@ -146,10 +145,10 @@ def _run(default_name: str, make: MakeUnit, args: Sequence[str] | None, descript
         config = [name for name in overrides.names('config', ()) if name != 'reference']
         given = {name: value for name, value in overrides.rest().items()
                  if name not in OWN_PARAMETERS}
-        named = ''.join(overrides.names('wiring', [wiring]))
+        named = overrides.text('wiring', wiring)
         wired = find(named)
         # the settings that a sheet stands for are parameters; its own name is none
-        overrides.names(SHEET, ())
+        overrides.text(SHEET)
         with told_while_compiling(node):
             unit = make(node.get_name(), wired, config, given)
             limits = {setting: limit_of(wired.load(*config))
@@ -199,8 +198,7 @@ class _Ending:
 
 
 @contextmanager
-def ros_node(name: str, arguments: Sequence[str], example: str,
-             undeclared: bool = True) -> Iterator[Node]:
+def ros_node(name: str, arguments: Sequence[str], example: str) -> Iterator[Node]:
     """
     Give this process its node, and take it out of the graph in the end.
 
@@ -209,8 +207,6 @@ def ros_node(name: str, arguments: Sequence[str], example: str,
     name : of the node unless it is remapped
     arguments : command line without the program's name
     example : a right ROS 2 parameter, for the error
-    undeclared : whether parameters that nobody has declared reach `Overrides`, which says what was
-        meant
 
     Raises UserError: the command line has an argument that is none of ROS 2's, or a wrong one.
     """
@@ -222,7 +218,8 @@ def ros_node(name: str, arguments: Sequence[str], example: str,
     _init_ros(name, arguments, example)
     try:
         try:
-            node = Node(name, allow_undeclared_parameters=undeclared)
+            # what nobody has declared reaches `Overrides`, which says what was meant
+            node = Node(name, allow_undeclared_parameters=True)
         except (RuntimeError, InvalidParameterTypeException) as error:
             raise UserError(_first_line(error)) from error
         try:

@@ -21,7 +21,7 @@ from antenna_drive.lockstep.compiled_loop import Call, Peer, Reading, Time, Word
 from antenna_drive.lockstep.compiled_unit import CompiledForm, form_of
 from antenna_drive.lockstep.conductor import Conductor, SLACK
 from antenna_drive.lockstep.delays import empty_counts
-from antenna_drive.lockstep.frame import HEADER, READING_PREFIX, SENDER
+from antenna_drive.lockstep.frame import CDR_LITTLE_ENDIAN, HEADER, SENDER
 from antenna_drive.lockstep.inbox import DEPTH, Frame
 from antenna_drive.lockstep.member import BRIEF_WAIT_S, Member
 from antenna_drive.lockstep.pace import Pace
@@ -187,7 +187,7 @@ class Exchange:
             s.words[getattr(Word, name)] = value
 
     def _prepare_readings(self) -> None:
-        readings, prefix = self._channel.readings, READING_PREFIX
+        readings, prefix = self._channel.readings, CDR_LITTLE_ENDIAN
         size = len(prefix) + 8
         self._reading_bytes = np.zeros((len(readings), size), np.uint8)
         self._reading_bytes[:, :len(prefix)] = np.frombuffer(prefix, np.uint8)

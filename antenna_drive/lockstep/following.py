@@ -6,9 +6,7 @@ The steps of a running drive, put together from the frames of its units by someb
 Unlike a member of the lock-step, who is there from step 0 on, a `Follower` may come at any time.
 The units then send what they remember, which may have gaps: a follower begins behind the last of
 them. It turns to another run when the conductor speaks of it and every unit has sent a step of it:
-a frame that somebody invents begins no run. `Thinning` gives every n-th step of some units, whose
-frames are taken in bulk, to a reader at a lower rate than that of the steps. Nothing here needs
-ROS.
+a frame that somebody invents begins no run. Nothing here needs ROS.
 """
 
 from collections import deque
@@ -17,8 +15,6 @@ from typing import NamedTuple
 
 from antenna_drive.lockstep.frame import all_finite, HEADER, LARGEST_RUN, NO_RUN, SENDER
 from antenna_drive.lockstep.inbox import Frame
-from antenna_drive.physics.arrays import FloatArray
-import numpy as np
 
 # Units are a few steps apart at most; more incomplete steps than this are not genuine.
 _DEPTH = 4096
@@ -29,12 +25,17 @@ _MOST_PAST_RUNS = 16
 
 
 class Step(NamedTuple):
-    """One complete step: its run and number, the macro-step [s], the value of every signal."""
+    """One complete step of a drive."""
 
     run: int
     number: int
-    step_s: float
-    values: list[float]
+    step_s: float  # macro-step [s]
+    numbers: list[float]  # of every signal its value and time derivative
+
+    @property
+    def values(self) -> list[float]:
+        """Return the value of every signal."""
+        return self.numbers[::2]
 
 
 class _Run:
@@ -75,6 +76,7 @@ class Follower:
     """
     Puts frames together to steps.
 
+    lengths : how many numbers a frame of each unit has
     run : the run in progress, 0 for none
     lost : steps that were missed after the first that was seen, in all runs together
     refused : frames that are none: wrong length, NaN or infinite, no run, no step, another than
@@ -89,7 +91,7 @@ class Follower:
         lengths : how many numbers a frame of each unit has, in the order of the signals
         conductor : the unit that owns the run: nobody else begins one
         """
-        self._lengths = dict(lengths)
+        self.lengths = dict(lengths)
         self._conductor = conductor
         self._runs: dict[float, _Run] = {}
         self._past: deque[float] = deque(maxlen=_MOST_PAST_RUNS)
@@ -100,13 +102,25 @@ class Follower:
         self.doubled: dict[str, tuple[float, float]] = {}
         self._over = False
 
+    @property
+    def senders(self) -> dict[str, float]:
+        """Return whose frames of the run in progress are read, by unit."""
+        return dict(self._runs[self.run].senders) if self.run else {}
+
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """Return the units whose frame of the next step has not come."""
+        run = self._runs.get(self._announced)
+        frames = {} if run is None else run.steps.get(run.next or 0, {})
+        return tuple(unit for unit in self.lengths if unit not in frames)
+
     def finish(self) -> None:
         """Expect no more frames: memories need not wait for newer ones."""
         self._over = True
 
     def receive(self, unit: str, frame: Sequence[float]) -> None:
         """Take in a frame of a unit."""
-        if len(frame) != self._lengths[unit] or not all_finite(frame):
+        if len(frame) != self.lengths[unit] or not all_finite(frame):
             self.refused += 1
             return
         if frame[0] == NO_RUN or frame[0] in self._past:
@@ -139,12 +153,12 @@ class Follower:
             self.refused += frames[unit] != frame
             return
         frames[unit] = frame
-        if run.newest is None and len(run.senders) == len(self._lengths):
+        if run.newest is None and len(run.senders) == len(self.lengths):
             # A unit goes one step ahead of the conductor. The conductor may be waiting for the
             # follower, so the unit's last step need not become complete before this one begins.
             run.newest = max(number - (self._conductor not in of_step)
                              for number, of_step in run.steps.items())
-        if len(frames) == len(self._lengths):
+        if len(frames) == len(self.lengths):
             run.complete.append(number)
 
     def steps(self) -> Iterator[Step]:
@@ -174,10 +188,10 @@ class Follower:
                 for older in [known for known in run.steps if known < number]:
                     del run.steps[older]
             run.next = number + 1
-            values: list[float] = []
-            for unit in self._lengths:
-                values += frames[unit][len(HEADER)::2]
-            yield Step(self.run, number, frames[self._conductor][2], values)
+            numbers: list[float] = []
+            for unit in self.lengths:
+                numbers += frames[unit][len(HEADER):]
+            yield Step(self.run, number, frames[self._conductor][2], numbers)
 
     def _turn(self, following: _Run) -> None:
         if self.run:
@@ -192,74 +206,3 @@ class Follower:
 
 def _is_count(number: float) -> bool:
     return 0.0 <= number < LARGEST_RUN and number % 1.0 == 0.0
-
-
-class Thinned(NamedTuple):
-    """One step of all units that are read."""
-
-    run: int
-    step: int  # its number
-    step_s: float  # macro-step [s]
-    values: dict[str, FloatArray]  # by unit, the value of each of its signals, shape (signals,)
-
-    @property
-    def time_ns(self) -> int:
-        """Return the simulated time of the step [ns], rounded as on `clock`."""
-        return round(self.step * self.step_s * 1e9)
-
-
-class Thinning:
-    """Takes the frames of units in any portions; returns the steps that are due."""
-
-    def __init__(self, units: Sequence[str], rate_hz: float) -> None:
-        """
-        Begin with no step.
-
-        units : whose frames make a step complete
-        rate_hz : how many steps for each simulated second; the nearest that the macro-step allows,
-            and at most every step
-        """
-        self._units = tuple(units)
-        self._rate_hz = rate_hz
-        self._incomplete: dict[tuple[int, int], dict[str, FloatArray]] = {}
-        self._senders: dict[tuple[str, int], float] = {}
-        self._last = (0, -1)
-
-    def take(self, unit: str, frames: FloatArray) -> None:
-        """
-        Take frames of a unit.
-
-        unit : that sent them
-        frames : rows of a `FrameLayout`; rows that are no frame of a run are left out, and those
-            of a second node of the unit's name
-        """
-        frames = frames[np.isfinite(frames).all(axis=1)]
-        run, step, step_s, _ = frames[:, :len(HEADER)].T
-        frames = frames[(run > NO_RUN) & (run < LARGEST_RUN) & (run % 1.0 == 0.0)
-                        & (step >= 0.0) & (step < LARGEST_RUN) & (step_s > 0.0)]
-        _, step, step_s, _ = frames[:, :len(HEADER)].T
-        every = np.maximum(1.0, np.round(1.0 / (self._rate_hz * step_s)))
-        for frame in frames[step % every == 0.0]:
-            key = int(frame[0]), int(frame[1])
-            sender = self._senders.setdefault((unit, key[0]), float(frame[SENDER]))
-            if key > self._last and sender == frame[SENDER]:
-                self._incomplete.setdefault(key, {}).setdefault(unit, frame)
-        for key in sorted(self._incomplete)[:-_DEPTH]:
-            del self._incomplete[key]
-        for known in list(self._senders)[:-_DEPTH]:
-            del self._senders[known]
-
-    def complete(self) -> list[Thinned]:
-        """Return the steps that are complete now, each once and in order."""
-        found = []
-        for key in sorted(self._incomplete):
-            frames = self._incomplete[key]
-            if len(frames) == len(self._units):
-                step_s = float(frames[self._units[0]][HEADER.index('step_s')])
-                found.append(Thinned(*key, step_s, {
-                    unit: frame[len(HEADER)::2] for unit, frame in frames.items()}))
-                self._last = key
-        # each unit sends in order: what lacks a unit before a complete step stays so
-        self._incomplete = {key: frames for key, frames in self._incomplete.items()
-                            if key > self._last}
-        return found

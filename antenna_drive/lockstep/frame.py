@@ -34,14 +34,18 @@ LARGEST_RUN = 2.0 ** 52
 # A birth later than this leaves no room for the runs that follow.
 LATEST_BIRTH = LARGEST_RUN - 2.0 ** 40
 
-_CDR_LITTLE_ENDIAN = b'\x00\x01\x00\x00'
-
-# In front of the number of a Float64, and of seconds and nanoseconds of a Clock: eight bytes each.
-READING_PREFIX = _CDR_LITTLE_ENDIAN
+# In front of every message; behind it are the eight bytes of a Float64 or a Clock.
+CDR_LITTLE_ENDIAN = b'\x00\x01\x00\x00'
 
 
 class FrameLayout:
-    """The length, labels and bytes of one unit's frames."""
+    """
+    The length, labels and bytes of one unit's frames.
+
+    length, label : how many numbers a frame has, and their names and units
+    prefix : the bytes in front of the numbers
+    packed_size : how many bytes `encode` packs behind the header
+    """
 
     def __init__(self, signals: Sequence[Signal]) -> None:
         """Lay out frames that carry `signals`; none for an observer, which only says its step."""
@@ -55,7 +59,7 @@ class FrameLayout:
         self.prefix = _cdr_prefix(self.label, self.length)
         self._data = struct.Struct(f'<{self.length}d')
         self._header = struct.Struct(f'<{len(HEADER)}d')
-        self._outputs = struct.Struct(f'<{2 * len(self.signals)}d')
+        self.packed_size = 16 * len(self.signals)
         self._size = len(self.prefix) + self._data.size
 
     def encode(self, run: float, step: int, step_s: float, sender: float,
@@ -69,22 +73,13 @@ class FrameLayout:
         """
         return self.prefix + self._header.pack(run, step, step_s, sender) + packed
 
-    @property
-    def packed_size(self) -> int:
-        """Return how many bytes `encode` packs behind the header."""
-        return self._outputs.size
-
-    def unpack(self, packed: bytes) -> tuple[float, ...]:
-        """Return the values and derivatives that `encode` packs behind the header."""
-        return self._outputs.unpack(packed)
-
     def hello(self, birth: float, sender: float, ended: float = NO_RUN) -> bytes:
         """
         Return the serialised hello of a node born at `birth` [us of wall time].
 
         In the place of step_s a conductor names the run that has just ended.
         """
-        return self.encode(NO_RUN, int(birth), ended, sender, bytes(self._outputs.size))
+        return self.encode(NO_RUN, int(birth), ended, sender, bytes(self.packed_size))
 
     def decode(self, message: bytes) -> tuple[float, ...] | None:
         """Return the numbers of a message of exactly this layout, None for any other message."""
@@ -117,7 +112,7 @@ def _cdr_prefix(label: str, length: int) -> bytes:
     body += b'\0' * (-len(body) % 4)
     body += struct.pack('<IIII', length, length, 0, length)
     body += b'\0' * (-len(body) % 8)
-    return _CDR_LITTLE_ENDIAN + body
+    return CDR_LITTLE_ENDIAN + body
 
 
 def read_foreign(message: bytes) -> tuple[float, ...]:

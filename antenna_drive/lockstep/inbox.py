@@ -65,16 +65,14 @@ class Inbox:
         self._lengths = dict(lengths)
         self._stepping = {peer: slots for peer, slots in self.slots.items()
                           if peer not in in_bulk}
-        self._awaited: tuple[float, float] | None = None
         self._early: deque[tuple[str, Frame, int]] = deque()
         self._past_runs: deque[float] = deque(maxlen=8)
 
-    def begin(self, run: float, step: int = 0) -> None:
+    def begin(self, run: float) -> None:
         """Turn to a new run: forget the old one's frames and take in those that came early."""
         self.forget(self.run)
         self.run = run
-        self.step = step
-        self._awaited = (run, float(step))
+        self.step = 0
         self.senders.clear()
         self.doubled.clear()
         for slots in self.slots.values():
@@ -112,24 +110,6 @@ class Inbox:
             return True
         return False
 
-    def accept(self, peer: str, frame: Frame) -> bool:
-        """
-        Take in a frame if it is the one that is wanted next, whole and finite.
-
-        Nearly every frame is, and for those this does all that `well_formed` and `offer` do at
-        a fraction of their cost. Any other is left to them.
-        """
-        if (frame[:2] == self._awaited and len(frame) == self._lengths[peer]
-                and math.isfinite(sum(frame)) and peer in self._stepping
-                and frame[SENDER] == self.senders.get(peer, frame[SENDER])):
-            slots = self._stepping[peer]
-            slot = self.step % DEPTH
-            if slots[slot] is None:
-                self.senders[peer] = frame[SENDER]
-                slots[slot] = frame
-                return True
-        return False
-
     def offer(self, peer: str, frame: Frame) -> None:
         """Take in a well-formed frame, or refuse it and count why."""
         run = frame[0]
@@ -150,16 +130,10 @@ class Inbox:
         for slots in self._stepping.values():
             slots[slot] = None
         self.step += 1
-        self._awaited = (self.run, float(self.step))
         # Nobody can announce a run and let this one go on: what came early and is still
         # waiting this many steps later belongs to no run.
         while self._early and self.step - self._early[0][2] > DEPTH:
             self.refuse(self._early.popleft()[0], Refusal.WRONG_RUN)
-
-    def resume(self, step: int) -> None:
-        """Want the frames of `step` next: somebody else has used those before it."""
-        self.step = step
-        self._awaited = (self.run, float(step))
 
     @property
     def stepping(self) -> tuple[str, ...]:

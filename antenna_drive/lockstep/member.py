@@ -3,13 +3,10 @@
 """
 The protocol of a unit that takes part in a run.
 
-A member is a plain state machine, as are a `Guest`, whom nobody waits for, and the `Conductor`,
-who owns the run: frames go in through `receive`, outputs to be published come out of `go_on`.
-Others carry the frames.
+A member is a plain state machine, as is the `Conductor`, who owns the run: frames go in through
+`receive`, outputs to be published come out of `go_on`. Others carry the frames.
 """
 
-from array import array
-from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 
 from antenna_drive.emulator.unit import FloatArray, Signal, Unit
@@ -91,9 +88,7 @@ class Member:
         self._announced: Frame | None = None
         self._announced_at = 0
         self._deceived_at: int | None = None  # the step at which a frame was last found false
-        # one memory: a numpy array is slow to write single numbers to
-        self._numbers = array('d', bytes(2 * 8 * len(columns)))
-        self._inputs = np.asarray(self._numbers).reshape(-1, 2)
+        self._inputs = np.zeros((len(columns), 2))
         self.packed = bytes(self.layout.packed_size)
         self._shape = (len(unit.outputs), 2)
         self._reads_itself = any(peer == unit.name for peer, _ in columns)
@@ -113,7 +108,7 @@ class Member:
 
     def receive(self, peer: str, frame: Frame) -> None:
         """Take in a frame or refuse it."""
-        if self.inbox.accept(peer, frame) or not self._well_formed(peer, frame):
+        if not self._well_formed(peer, frame):
             return
         if peer == self.conductor:
             self._receive_from_conductor(frame)
@@ -193,11 +188,6 @@ class Member:
         deceived = self._deceived_at is not None and self.step - self._deceived_at <= MEMORY
         return DECEIVED_STANDSTILL_S if deceived else STANDSTILL_S
 
-    def lost(self, peer: str) -> int:
-        """Return how many frames came too far ahead of one of the peer's that is missing."""
-        count = self.inbox.refused.get((peer, Refusal.TOO_FAR_AHEAD), 0)
-        return count if count and peer in self.missing() else 0
-
     def steady(self) -> bool:
         """Return whether nothing is due but the next steps of the run in progress."""
         return (self.run != NO_RUN and not self.fault and self._announced is None
@@ -205,8 +195,7 @@ class Member:
 
     def follow(self, step: int, outputs: FloatArray) -> None:
         """Take over at `step` from whoever has made the steps up to it with this unit."""
-        self.inbox.resume(step)
-        self.step = step
+        self.inbox.step = self.step = step
         self._checked(outputs)
 
     def message(self) -> bytes:
@@ -217,25 +206,20 @@ class Member:
         """Return the serialised message that this member is here and takes part in no run."""
         return self.layout.hello(self.birth, self.sender)
 
-    def _begin(self, run: float, step_s: float, step: int = 0) -> FloatArray | None:
+    def _begin(self, run: float, step_s: float) -> FloatArray | None:
         if self._deceived_at is not None:
-            self._deceived_at -= self.step - step  # as many steps ago as before
-        self.inbox.begin(run, step)
-        self.step = step
+            self._deceived_at -= self.step  # as many steps ago as before
+        self.inbox.begin(run)
+        self.step = 0
         self.step_s = step_s
         self.fault = ''
         return self._checked(self.unit.start(step_s))
 
     def _advance(self) -> FloatArray | None:
-        slot = self.step % DEPTH
-        numbers = self._numbers
-        place = 0
-        for slots, column in self._read:
-            frame = slots[slot]
+        for row, (slots, column) in zip(self._inputs, self._read):
+            frame = slots[self.step % DEPTH]
             assert frame is not None
-            numbers[place] = frame[column]
-            numbers[place + 1] = frame[column + 1]
-            place += 2
+            row[:] = frame[column:column + 2]
         outputs = self.unit.step(self.step, self._inputs)
         self.inbox.advance()
         self.step += 1
@@ -247,10 +231,9 @@ class Member:
         if outputs.shape != self._shape:
             self.fault = f'outputs of shape {outputs.shape}, wanted {self._shape}'
         else:
-            packed = outputs.tobytes()
-            values = self.layout.unpack(packed)
+            values = outputs.ravel().tolist()
             if all_finite(values):
-                self.packed = packed
+                self.packed = outputs.tobytes()
                 if self._reads_itself:
                     self._own_slots[self.step % DEPTH] = (
                         self.run, float(self.step), self.step_s, self.sender, *values)
@@ -269,68 +252,3 @@ def _column(name: str, outputs: Mapping[str, Sequence[Signal]]) -> tuple[str, in
         known_names = ', '.join(f'{key}/{item.name}' for key in outputs for item in outputs[key])
         raise ValueError(f'{name}: no such signal, known are {known_names}')
     return unit, len(HEADER) + 2 * names.index(signal)
-
-
-class Guest(Member):
-    """
-    A member that nobody waits for, and that may join a run in the middle.
-
-    It begins at the earliest step that every peer still remembers; `Unit.start` is called all
-    the same. From there on it follows as any member does. While it reads what was sent before
-    it came, its peers go on and forget: where such a frame is lost it joins again behind it.
-
-    joined : how many times it has joined a run
-    """
-
-    def __init__(self, unit: Unit, outputs: Mapping[str, Sequence[Signal]] = OUTPUTS,
-                 conductor: str = TEST_SIGNAL) -> None:
-        """Prepare to follow; see Member."""
-        super().__init__(unit, 0.0, outputs, conductor)
-        self.joined = 0
-        self._first: dict[str, Frame] = {}
-
-    def receive(self, peer: str, frame: Frame) -> None:
-        """Take in a frame or refuse it."""
-        if self.run != NO_RUN:
-            super().receive(peer, frame)
-            if (self.lost(peer) and self.run == self._joining()
-                    and self.step < self._earliest() + MEMORY):
-                self.inbox.refused.clear()
-                self.inbox.begin(NO_RUN)
-                self._first.clear()
-        elif (self.inbox.well_formed(peer, frame) and frame[0] != NO_RUN
-              and peer in self.missing()):
-            self._first[peer] = frame
-
-    def _joining(self) -> float:
-        """Return the run that most peers speak of: one frame of one of them may be invented."""
-        runs = Counter(frame[0] for frame in self._first.values())
-        return max(runs, key=lambda run: (runs[run], run), default=NO_RUN)
-
-    def _earliest(self) -> float:
-        joining = self._joining()
-        return max((frame[1] for frame in self._first.values() if frame[0] == joining),
-                   default=0.0)
-
-    def wanted(self) -> tuple[str, ...]:
-        """Return the peers from whom a frame would be of use now."""
-        return super().wanted() if self.run != NO_RUN else self.missing()
-
-    def missing(self) -> tuple[str, ...]:
-        """Return the peers without whom it cannot go on."""
-        if self.run != NO_RUN:
-            return super().missing()
-        joining, earliest = self._joining(), self._earliest()
-        return tuple(peer for peer in self.peers if peer not in self._first
-                     or self._first[peer][0] != joining or self._first[peer][1] < earliest)
-
-    def go_on(self, stands_still: bool = True) -> FloatArray | None:
-        """Join the run in progress or make the next step; see Member."""
-        if self.run != NO_RUN or self.missing():
-            return super().go_on(stands_still)
-        self.joined += 1
-        outputs = self._begin(self._joining(), self._first[self.conductor][2],
-                              int(self._earliest()))
-        for peer, frame in self._first.items():
-            self.inbox.offer(peer, frame)
-        return outputs

@@ -78,7 +78,7 @@ def declare(node: Node, unit: Unit, overrides: Overrides, settings: Settings,
     if conductor:
         declare_names(node, 'run.observers', overrides.names('run.observers', ()),
                       'names of recorders that every step waits for')
-        sheet = ''.join(overrides.names(SHEET, ()))
+        sheet = overrides.text(SHEET)
         if plays:
             node.declare_parameter(SHEET, sheet, ParameterDescriptor(
                 description='file with the test sheet that the service play plays'),

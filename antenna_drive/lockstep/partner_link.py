@@ -13,7 +13,7 @@ import time
 
 from antenna_drive.lockstep.member import Member
 from antenna_drive.lockstep.partner import Answers, NO_STEP, PartnerUnit, STOP, ZERO
-from antenna_drive.lockstep.readings import READING_QOS
+from antenna_drive.lockstep.readings import READING_QOS, steps_between
 from rclpy.node import Node
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension
 
@@ -70,7 +70,7 @@ class PartnerLink:
     def begin(self) -> None:
         """Turn to the run that begins."""
         member = self._member
-        self._every = max(1, round(1.0 / (self._rate_hz * member.step_s)))
+        self._every = steps_between(self._rate_hz, member.step_s)
         self.answers.begin(member.run, member.step_s)
 
     def took(self, answer: Answer) -> None:

@@ -19,8 +19,8 @@ from antenna_drive.yaml_text import yaml_float
 from simgap.command.programs import PARENT
 from simgap.errors import UserError
 
-# Nodes end within three seconds of a signal, whatever holds them.
-END_PATIENCE_S = 5.0
+# Nodes end within five seconds of a signal, whatever holds them.
+END_PATIENCE_S = 6.0
 
 Parameter = float | int | bool | str | Sequence[float] | Sequence[str]
 

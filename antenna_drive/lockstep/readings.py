@@ -8,7 +8,7 @@ from typing import Any
 
 from antenna_drive.emulator.unit import FloatArray, Signal
 from antenna_drive.lockstep.compiled_loop import TIME
-from antenna_drive.lockstep.frame import READING_PREFIX
+from antenna_drive.lockstep.frame import CDR_LITTLE_ENDIAN
 from antenna_drive.lockstep.ros_link import remembered
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
@@ -26,6 +26,11 @@ CHANGES_QOS = remembered(1000)
 
 _FLOAT64 = struct.Struct('<4sd')
 _CLOCK = struct.Struct('<4siI')
+
+
+def steps_between(rate_hz: float, step_s: float) -> int:
+    """Return after how many steps of `step_s` [s] something is due at a rate, at least one."""
+    return max(1, round(1.0 / (rate_hz * step_s)))
 
 
 class Readings:
@@ -64,16 +69,16 @@ class Readings:
 
     def every(self, step_s: float) -> int:
         """Return after how many steps of `step_s` [s] the next readings are published."""
-        return max(1, round(1.0 / (self.rate_hz * step_s))) if self.rate_hz > 0.0 else 0
+        return steps_between(self.rate_hz, step_s) if self.rate_hz > 0.0 else 0
 
     def publish(self, step: int, step_s: float, outputs: FloatArray) -> None:
         """Publish the readings of a step."""
         values = outputs[:, 0].tolist()
         for row, scale, publisher in self._rows:
-            publisher.publish(_FLOAT64.pack(READING_PREFIX, scale * values[row]))
+            publisher.publish(_FLOAT64.pack(CDR_LITTLE_ENDIAN, scale * values[row]))
         if self._clock is not None:
             seconds, nanoseconds = divmod(round(step * step_s * 1e9), 1_000_000_000)
-            self._clock.publish(_CLOCK.pack(READING_PREFIX, seconds, nanoseconds))
+            self._clock.publish(_CLOCK.pack(CDR_LITTLE_ENDIAN, seconds, nanoseconds))
 
 
 class Commanded:

@@ -53,7 +53,7 @@ class NotForExecutors(CallbackGroup):  # type: ignore[misc]
 
 def unserved(node: Node, kind: Any, topic: str, qos: QoSProfile, raw: bool = False) -> Any:
     """Return a subscription whose messages are taken when they are asked for."""
-    return node.create_subscription(kind, topic, _never_called, qos, raw=raw,
+    return node.create_subscription(kind, topic, lambda message: None, qos, raw=raw,
                                     callback_group=NotForExecutors())
 
 
@@ -69,8 +69,6 @@ class FrameLink:
             peer: unserved(node, Float64MultiArray, f'{peer}/frame', READ_QOS, raw=True)
             for peer in self._layouts}
         self._handles = {peer: item.handle for peer, item in self._subscriptions.items()}
-        self._ways = {peer: (handle.take_message, self._layouts[peer].decode)
-                      for peer, handle in self._handles.items()}
         self._guard = node.create_guard_condition(lambda: None, callback_group=NotForExecutors())
         self._guard_handle = self._guard.handle
         context = node.context.handle
@@ -85,12 +83,11 @@ class FrameLink:
         Returns its numbers, none at all if the message cannot be read; None if there is no
         message.
         """
-        take_message, decode = self._ways[peer]
-        taken = take_message(Float64MultiArray, True)
+        taken = self._handles[peer].take_message(Float64MultiArray, True)
         if taken is None:
             return None
         message: bytes = taken[0]
-        frame = decode(message)
+        frame = self._layouts[peer].decode(message)
         return read_foreign(message) if frame is None else frame
 
     def take_all(self, peer: str) -> FloatArray | None:
@@ -151,10 +148,6 @@ class FrameLink:
     def publishers(self) -> dict[str, int]:
         """Return how many publishers each peer's frame topic has."""
         return {peer: item.get_publisher_count() for peer, item in self._subscriptions.items()}
-
-
-def _never_called(message: Any) -> None:
-    raise AssertionError('messages are taken by who asks for them, alone')
 
 
 class Reception:

@@ -12,8 +12,8 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future, TimeoutError  # noqa: A004 (another one in Python 3.10)
 import math
-from threading import Event, Lock
 from typing import Any
 
 from antenna_drive.emulator.unit import Unit
@@ -36,29 +36,20 @@ PATIENCE_S = 5.0
 Settings = Mapping[str, tuple[Entry, Value]]
 
 
-class _Request:
-    """Changes on their way to the lock-step thread."""
-
-    def __init__(self, changes: dict[str, Value]) -> None:
-        self.changes = changes
-        self.done = Event()
-        self.refusal = ''
-
-
 class Tuning:
     """The live changes of one unit, from any thread to the lock-step thread."""
 
     def __init__(self, unit: Unit) -> None:
         """Take changes for `unit`."""
         self._unit = unit
-        self._queue: deque[_Request] = deque()
-        self._lock = Lock()  # held while changes are put in force or withdrawn
+        # changes, and why they were refused, '' if they are in force
+        self._queue: deque[tuple[dict[str, Value], Future[str]]] = deque()
         self.wake: Callable[[], None] = lambda: None
 
     @property
     def pending(self) -> bool:
         """Return whether changes wait to be applied."""
-        return bool(self._queue)
+        return any(not refusal.cancelled() for _, refusal in tuple(self._queue))
 
     def request(self, changes: dict[str, Value], wait: bool = True) -> str:
         """
@@ -71,28 +62,29 @@ class Tuning:
             self._unit.check(changes)
         except ParameterError as error:
             return str(error)
-        request = _Request(changes)
-        self._queue.append(request)
+        refusal: Future[str] = Future()
+        self._queue.append((changes, refusal))
         self.wake()
-        if wait and not request.done.wait(PATIENCE_S):
-            with self._lock:
-                if not request.done.is_set():
-                    self._queue.remove(request)
-                    return f'the node has not come to its next step for {PATIENCE_S:g} s'
-        return request.refusal
+        try:
+            return refusal.result(PATIENCE_S) if wait else ''
+        except TimeoutError:
+            if refusal.cancel():
+                return f'the node has not come to its next step for {PATIENCE_S:g} s'
+            return refusal.result()  # it is being put in force
 
     def apply(self) -> dict[str, Value]:
         """Apply what was asked for; called by the lock-step thread between two steps."""
         applied: dict[str, Value] = {}
-        with self._lock:
-            while self._queue:
-                request = self._queue.popleft()
-                try:
-                    self._unit.tune(request.changes)
-                    applied.update(request.changes)
-                except ParameterError as error:
-                    request.refusal = str(error)
-                request.done.set()
+        while self._queue:
+            changes, refusal = self._queue.popleft()
+            if not refusal.set_running_or_notify_cancel():
+                continue  # who asked has given up
+            try:
+                self._unit.tune(changes)
+                applied.update(changes)
+                refusal.set_result('')
+            except ParameterError as error:
+                refusal.set_result(str(error))
         return applied
 
 
@@ -145,6 +137,13 @@ class Overrides:
             raise ParameterError(f'{name}: {given!r} given, allowed is a list of texts')
         return [text for text in texts if text]
 
+    def text(self, name: str, default: str = '') -> str:
+        """Return the text given for a parameter, or its default; raise as `names` does."""
+        given = self.names(name, [default])
+        if len(given) > 1:
+            raise ParameterError(f'{name}: {given!r} given, allowed is one text')
+        return ''.join(given)
+
     def rest(self) -> dict[str, Any]:
         """Return what has not been asked for."""
         return {key: value for key, value in self._values.items() if key not in self._asked}
@@ -159,7 +158,8 @@ class Overrides:
 def declare(node: Node, settings: Settings) -> None:
     """Declare every setting with its unit, range and meaning; constants as read-only."""
     for name, (entry, value) in settings.items():
-        node.declare_parameter(name, _ros_value(value), describe(entry), ignore_override=True)
+        node.declare_parameter(name, list(value) if isinstance(value, tuple) else value,
+                               describe(entry), ignore_override=True)
 
 
 def declare_names(node: Node, name: str, value: Sequence[str], description: str) -> None:
@@ -230,7 +230,3 @@ def _plain(value: Any) -> Any:
     if value is None or isinstance(value, (bool, int, float, str)):
         return value
     return list(value)
-
-
-def _ros_value(value: Value) -> Any:
-    return list(value) if isinstance(value, tuple) else value

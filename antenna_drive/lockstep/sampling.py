@@ -9,7 +9,7 @@ import time
 from antenna_drive.emulator.unit import FloatArray
 from antenna_drive.emulator.units import home
 from antenna_drive.emulator.wiring import TEST_SIGNAL
-from antenna_drive.lockstep.frame import process_of
+from antenna_drive.lockstep.frame import process_of, two_of_one_name
 from antenna_drive.lockstep.namespaces import AnotherDrive, drive_namespace
 from antenna_drive.lockstep.observer import Observer
 from antenna_drive.lockstep.processes import DriveProcesses, Parameter
@@ -61,11 +61,14 @@ def sample_processes(steps: int, step_s: float, *, name: str = 'observer',
         watch.done = -1
 
     def take(k: int, time_s: float, values: FloatArray) -> None:
+        if k != watch.done + 1:
+            raise UserError(f'steps {watch.done + 1} to {k - 1} were lost: a node has ended '
+                            'before it had sent them, or this process was stopped')
         if k in (0, steps):
             moments['began' if k == 0 else 'ended'] = time.monotonic()
         if k <= steps:
             samples[k] = values
-            watch.done = k
+        watch.done = k
 
     with drive_namespace(None, name) as space, Observer(
             name, take, on_begin=begin, namespace=space) as observer, \
@@ -120,8 +123,13 @@ class RunWatch:
 
 
 def _check_senders(processes: DriveProcesses, observer: Observer) -> None:
-    if observer.doubled:
-        raise AnotherDrive(f'{observer.doubled}: nobody knows whose values the others used')
+    for unit, senders in observer.doubled.items():
+        raise AnotherDrive(f'{two_of_one_name(unit, senders)}: nobody knows whose values the '
+                           'others used')
+    for unit, count in observer.publishers().items():
+        if count > 1:
+            raise AnotherDrive(f'{count} nodes are called {unit}; end all but one, or give each '
+                               'drive a namespace of its own')
     for unit, sender in observer.senders.items():
         if process_of(sender) != processes.process(unit).pid:
             raise AnotherDrive(f'{unit}: its frames come from process {process_of(sender)}, which '

@@ -23,17 +23,9 @@ power fails, what was written since the last sync may be lost.
 from functools import partial
 import sys
 
-from antenna_drive.programs import end_with_starter, run_program
+from antenna_drive.programs import run_program
 
-
-def _run(arguments: list[str]) -> int:
-    end_with_starter()
-    # without ROS 2 this import is what says so
-    from antenna_drive.nodes.recorder_node import run
-    return run(arguments)
-
-
-main = partial(run_program, 'recorder', __doc__, _run)
+main = partial(run_program, 'recorder', __doc__, 'antenna_drive.nodes.recorder_node')
 
 if __name__ == '__main__':
     sys.exit(main())

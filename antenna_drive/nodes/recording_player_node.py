@@ -44,7 +44,7 @@ def run(path: str, arguments: Sequence[str]) -> int:
     with ros_node(NAME, arguments, 'pace:=1.0') as node:
         overrides = Overrides(node)
         pace = overrides.number('pace', _PACE, 1.0)
-        real = ''.join(overrides.names('real', ('real',)))
+        real = overrides.text('real', 'real')
         overrides.check_all_known(('pace', 'real'))
         _play(node, recording, real, pace, stop)
     return 0

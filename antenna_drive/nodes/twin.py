@@ -37,14 +37,7 @@ import sys
 
 from antenna_drive.programs import run_program
 
-
-def _run(arguments: list[str]) -> int:
-    # without ROS 2 this import is what says so
-    from antenna_drive.nodes.twin_node import run
-    return run(arguments)
-
-
-main = partial(run_program, 'twin', __doc__, _run)
+main = partial(run_program, 'twin', __doc__, 'antenna_drive.nodes.twin_node')
 
 if __name__ == '__main__':
     sys.exit(main())

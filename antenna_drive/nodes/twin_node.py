@@ -74,13 +74,6 @@ def run(arguments: Sequence[str]) -> int:
         return _TwinNode(node, stack).spin()
 
 
-def _text(overrides: Overrides, name: str) -> str:
-    given = overrides.names(name, ())
-    if len(given) > 1:
-        raise UserError(f'{name}: {given!r} given, allowed is one text')
-    return given[0] if given else ''
-
-
 def _switch(given: dict[str, Any], name: str) -> bool:
     value = given.get(name, _SWITCHES[name])
     if not isinstance(value, bool):
@@ -97,7 +90,7 @@ class _TwinNode:
         overrides = Overrides(node)
         numbers = {name: overrides.number(name, entry, default) for (name, entry), default in zip(
             _ENTRIES.items(), (TwinSettings.alarms_per_day, TwinSettings.quiet_s), strict=True)}
-        texts = {name: _text(overrides, name) for name in _TEXTS}
+        texts = {name: overrides.text(name) for name in _TEXTS}
         config = [name for name in overrides.names('config', ()) if name != 'reference']
         switches = {name: _switch(overrides.rest(), name) for name in _SWITCHES}
         overrides.check_all_known(('config', *_ENTRIES, *_TEXTS, *_SWITCHES))

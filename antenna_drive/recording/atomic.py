@@ -1,16 +1,14 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""New files and folders that appear whole or not at all, and never in the place of another."""
+"""New files that appear whole or not at all, and never in the place of another."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
 import os
 from pathlib import Path
-import shutil
-import tempfile
 from typing import IO
 
-from simgap.drafts import drafted, umask
+from simgap.drafts import drafted
 from simgap.logs.channel import RecordingError
 
 
@@ -44,22 +42,3 @@ def new_file(path: Path) -> Iterator[IO[bytes]]:
             yield stream
     except OSError as error:
         raise refuse_io(path, error) from error
-
-
-@contextmanager
-def new_folder(path: Path) -> Iterator[Path]:
-    """Give a folder that becomes `path` if all goes well; RecordingError if it cannot."""
-    refuse_existing(path)
-    try:
-        draft = Path(tempfile.mkdtemp(dir=path.parent, prefix=f'.{path.name}.'))
-    except OSError as error:
-        raise refuse_io(path, error) from error
-    try:
-        yield draft
-        draft.chmod(0o777 & ~umask())
-        refuse_existing(path)
-        os.rename(draft, path)
-    except OSError as error:
-        raise refuse_io(path, error) from error
-    finally:
-        shutil.rmtree(draft, ignore_errors=True)

@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Reads the storage files of a bag, MCAP, record by record up to where they were cut off."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 import io
 import os
@@ -54,10 +53,6 @@ class Storage:
     changes: list[Any] = field(default_factory=list)
     messages: int = 0
     unpacked: int = 0
-
-    def begin_file(self) -> None:
-        """Forget the numbers of types and topics: each file has its own."""
-        self.schemas, self.topics = {}, {}
 
     def take(self, record: object) -> None:
         """Take in one record of a file."""
@@ -220,26 +215,6 @@ def _message_bytes(record: Message) -> bytes:
     return struct.pack('<BQ', Opcode.MESSAGE, len(content)) + content
 
 
-def _records(file: BinaryIO, size: int) -> Iterator[object]:
-    """Yield the records of a storage file; whatever the library meets in it is damage."""
-    within: Any = _Within(file, size)
-    reader = StreamReader(within, emit_chunks=True, validate_crcs=True,
-                          record_size_limit=None)
-    records = reader.records
-    while True:
-        try:
-            record = next(records)
-        except StopIteration:
-            return
-        except (DamageError, RecordingError):
-            raise
-        except Exception as error:  # noqa: B902 (a damaged file can raise anything in there)
-            if file.read(1) == b'' and size:
-                raise DamageError('the file ends early') from None
-            raise DamageError(f'{type(error).__name__} {one_line(error)}') from None
-        yield record
-
-
 def _opened(path: Path) -> BinaryIO:
     """Open a storage file; one that is packed as a whole is unpacked to a file without a name."""
     file: BinaryIO = path.open('rb')
@@ -268,14 +243,16 @@ def read_storage(path: Path, storage: Storage) -> None:
         raise DamageError(f'{path}: {error.strerror}') from error
     except OSError as error:
         raise RecordingError(f'{path}: {error.strerror}') from error
-    storage.begin_file()
+    storage.schemas, storage.topics = {}, {}  # each file has numbers of its own
     before = storage.messages
     count: int | None = None
     with file:
         size = os.fstat(file.fileno()).st_size
         footer: Footer | None = None
         try:
-            for record in _records(file, size):
+            within: Any = _Within(file, size)
+            for record in StreamReader(within, emit_chunks=True, validate_crcs=True,
+                                       record_size_limit=None).records:
                 if isinstance(record, Statistics):
                     count = record.message_count
                 elif isinstance(record, Footer):
@@ -284,7 +261,9 @@ def read_storage(path: Path, storage: Storage) -> None:
                     storage.take(record)
         except (DamageError, RecordingError):
             raise
-        except Exception as error:  # noqa: B902 (compressed data that is none, and the like)
+        except Exception as error:  # noqa: B902 (a damaged file can raise anything in there)
+            if file.read(1) == b'' and size:
+                raise DamageError('the file ends early') from None
             raise DamageError(f'{type(error).__name__} {one_line(error)}') from None
         if footer is None or file.read(1):
             raise DamageError('something follows the end')

@@ -12,23 +12,25 @@ file ends, so a long bag has several storage files, see `split_s`.
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 import io
+from itertools import chain
 import math
 import os
 from pathlib import Path
+import secrets
+import shutil
 import struct
 import time
 from typing import Any
 
-from antenna_drive.recording.atomic import new_folder, refuse_existing, refuse_io, sync_folder
+from antenna_drive.recording.atomic import refuse_existing, refuse_io, sync_folder
 from antenna_drive.recording.bag import (
     CDR_HEADER, CHANGE, CONFIGURATION, description, FORMAT, FORMAT_VERSION, MESSAGE_DEFINITION,
     MESSAGE_HASH, MESSAGE_TYPE, METADATA, NOTES, StorageFile,
 )
 from antenna_drive.recording.plain import freeze, to_json
-from antenna_drive.recording.recording import Recording
+from antenna_drive.recording.recording import in_rows, Recording
 from antenna_drive.recording.sheet import dump_sheet, FILE_NAME, TestSheet
 from mcap.writer import Writer
-import numpy as np
 from simgap.drafts import drafted
 from simgap.inputs.plain import PlainDataError
 from simgap.logs.channel import NANOSECONDS, RecordingError
@@ -150,8 +152,10 @@ class BagWriter:
         or the time is negative; what was written before stays readable.
         """
         if not 0 <= time_ns < 2**63 or any(map(math.isinf, values)):
-            for i, value in enumerate(values):
-                self._check(i, time_ns, value)
+            name, value = next((item for item in zip(self._signals, values, strict=True)
+                                if math.isinf(item[1])), ('a sample', values))
+            raise RecordingError(f'{name}: {value} at {time_ns} ns cannot be recorded; allowed '
+                                 'are finite numbers and times that are not negative')
         if self._full:
             self._split()
         pack, sequence, file = _CDR_FLOAT64.pack, step & 0xFFFFFFFF, self._files[-1]
@@ -165,21 +169,6 @@ class BagWriter:
         if (time_ns - self._flushed_ns >= self._flush_ns
                 or self._clock() - self._flushed_at >= self._flush_s):
             self.flush()
-
-    def add(self, signal: int, step: int, time_ns: int, value: float) -> None:
-        """Write one sample of a signal, given by its place in their order; raise as `write`."""
-        self._check(signal, time_ns, value)
-        with self._guarded() as writer:
-            writer.add_message(self._topics[signal], time_ns,
-                               _CDR_FLOAT64.pack(CDR_HEADER, value), time_ns, step & 0xFFFFFFFF)
-        self._files[-1].counts[signal] += 1
-        self._files[-1].reaches(time_ns)
-
-    def _check(self, signal: int, time_ns: int, value: float) -> None:
-        if math.isinf(value) or not 0 <= time_ns < 2**63:
-            name = list(self._signals)[signal]
-            raise RecordingError(f'{name}: {value} at {time_ns} ns cannot be recorded; allowed '
-                                 'are finite numbers and times that are not negative')
 
     def know(self, configuration: Mapping[str, Any]) -> None:
         """Write down the configuration instead of what was known; errors as of `change`."""
@@ -291,23 +280,22 @@ def write_bag(recording: Recording, path: str | Path) -> None:
     if recording.start_ns < 0:
         raise RecordingError(f'{path}: a time stamp of {recording.start_ns / NANOSECONDS:g} s is '
                              'negative; a bag has none')
-    with new_folder(path) as folder:
-        with BagWriter(folder / 'bag', {n: recording[n].unit for n in recording},
+    refuse_existing(path)
+    channels = list(recording.channels.values())
+    draft = path.with_name(f'.{path.name}.{secrets.token_hex(4)}')
+    try:
+        with BagWriter(draft, {n: recording[n].unit for n in recording},
                        configuration=recording.configuration, sheet=recording.sheet,
                        notes=recording.notes, stem=path.name, flush_s=math.inf) as bag:
             for change in recording.changes:
                 bag.change(change.step, change.unit, change.values)
-            channels = list(recording.channels.values())
-            if channels:
-                which = np.repeat(np.arange(len(channels)), [len(c) for c in channels])
-                stamps = np.concatenate([c.time_ns for c in channels])
-                values = np.concatenate([c.values for c in channels])
-                steps = np.concatenate([np.arange(len(c)) for c in channels])
-                order = np.lexsort((which, stamps))
-                for signal, step, stamp, value in zip(
-                        which[order].tolist(), steps[order].tolist(), stamps[order].tolist(),
-                        values[order].tolist(), strict=True):
-                    bag.add(signal, step, stamp, value)
-        for file in (folder / 'bag').iterdir():
-            file.rename(folder / file.name)
-        (folder / 'bag').rmdir()
+            rows = chain.from_iterable(zip(stamps.tolist(), table.tolist(), strict=True)
+                                       for stamps, table in in_rows(channels))
+            for number, (stamp, values) in enumerate(rows):
+                bag.write(number, stamp, values)
+        refuse_existing(path)
+        draft.rename(path)
+    except OSError as error:
+        raise refuse_io(path, error) from error
+    finally:
+        shutil.rmtree(draft, ignore_errors=True)

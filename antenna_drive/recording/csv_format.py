@@ -12,7 +12,7 @@ docs/recording.md describes the columns.
 """
 
 from array import array
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 import math
@@ -24,7 +24,9 @@ import warnings
 from antenna_drive.readings import FIELD_COLUMNS, RATE_COMMAND, RATE_COMMAND_COLUMN
 from antenna_drive.recording.atomic import new_file, refuse_existing
 from antenna_drive.recording.plain import to_json
-from antenna_drive.recording.recording import Change, Recording, unit_of
+from antenna_drive.recording.recording import (
+    all_stamps, Change, in_rows, Recording, unit_of,
+)
 from antenna_drive.recording.sheet import dump_sheet, load_sheet, TestSheet
 import numpy as np
 from simgap.errors import one_line
@@ -39,9 +41,6 @@ from simgap.logs.text import Cell, open_text, parse_nanoseconds, parse_number, r
 
 TIME = 'time_s'
 _OWN_COLUMN = re.compile(r'(\S+) \[([^\[\]]*)\]', re.ASCII)
-_BLOCK = 65536  # rows written at a time
-
-Column = tuple[IntArray, FloatArray]
 
 
 def read_csv(path: str | Path) -> Recording:
@@ -84,18 +83,18 @@ def read_csv(path: str | Path) -> Recording:
                     text = text.strip()
                     columns[i].append(parse_number(text, Cell(path, line, header[i]))
                                       if text else math.nan)
-    ordered: Iterable[Column] = _taken(np.array(stamps, np.int64), columns)
+    stamps_ns = np.array(stamps, np.int64)
     if not in_order:
-        ordered = sorted_rows(path, TIME, *_times_and_lines(path, time_column), ordered)
-    channels = {name: make_channel(name, unit, stamps_ns, numbers)
-                for (name, unit), (stamps_ns, numbers) in zip(units.items(), ordered, strict=True)
-                if name != TIME}
+        stamps_ns = _sort_rows(path, time_column, stamps_ns, columns)
+    channels = {name: make_channel(name, unit, own_stamps, numbers)
+                for (name, unit), (own_stamps, numbers) in zip(
+                    units.items(), _taken(stamps_ns, columns), strict=True) if name != TIME}
     sheet_path = path.with_suffix('.yaml')
     sheet = load_sheet(sheet_path) if sheet_path.is_file() else TestSheet()
     return replace(_with_meta(path, Recording(channels), len(stamps)), sheet=sheet)
 
 
-def _taken(stamps: IntArray, columns: 'list[array[float]]') -> Iterator[Column]:
+def _taken(stamps: IntArray, columns: list[Any]) -> Iterator[tuple[IntArray, FloatArray]]:
     """Yield stamps and values of each column, and keep none: ten million rows fill a memory."""
     stamps.flags.writeable = False
     while columns:
@@ -110,16 +109,40 @@ def _taken(stamps: IntArray, columns: 'list[array[float]]') -> Iterator[Column]:
             yield stamps[there], values[there]
 
 
-def _times_and_lines(path: Path, time_column: int) -> tuple[IntArray, IntArray]:
-    """Return time stamp and line of each row of a file that has been read; few ever need them."""
+def _sort_rows(path: Path, time_column: int, stamps: IntArray, columns: list[Any]) -> IntArray:
+    """
+    Put the rows into the order of time, each once; return the stamps of those that are left.
+
+    stamps : of each row [ns], shape (rows,)
+    columns : of each but that of the time the values, NaN where there is none, shape (rows,)
+
+    Raises RecordingError if two rows have one time stamp and differ. Warns with RecordingWarning
+    if rows were sorted, or repeated rows left out.
+    """
     with open_text(path) as stream, warnings.catch_warnings():
         warnings.simplefilter('ignore', RecordingWarning)
-        table = rows(path, stream)
-        next(table)
-        found = [(parse_nanoseconds(row[time_column].strip(), Cell(path, line, TIME)), line)
-                 for line, row in table]
-    stamps, lines = np.array(found, np.int64).T
-    return stamps, lines
+        # few ever need the lines: they are not kept while a file is read
+        lines = np.array([line for line, _ in rows(path, stream)][1:])
+    back = np.flatnonzero(np.diff(stamps) < 0) + 1
+    if back.size:
+        warnings.warn(f'{path}: line {lines[back[0]]}: the time is earlier than in the row '
+                      'before; the rows were sorted by time', RecordingWarning, stacklevel=3)
+    order = np.argsort(stamps, kind='stable')
+    stamps, lines = stamps[order], lines[order]
+    again = np.flatnonzero(np.diff(stamps) == 0) + 1
+    for number in set(range(len(columns))) - {time_column}:
+        values = np.array(columns[number])[order]
+        before, after = values[again - 1], values[again]
+        unlike = again[(before != after) & ~(np.isnan(before) & np.isnan(after))]
+        if unlike.size:
+            raise RecordingError(
+                f'{path}: line {lines[unlike[0]]}, column {TIME}: the time is that of line '
+                f'{lines[unlike[0] - 1]}, but the row is another one; remove one of them')
+        columns[number] = np.delete(values, again)
+    if again.size:
+        warnings.warn(f'{path}: line {lines[again].min()}: the row repeats an earlier one; '
+                      f'{again.size} such rows were left out', RecordingWarning, stacklevel=3)
+    return np.delete(stamps, again)
 
 
 def _header(path: Path, line: int, header: list[str]) -> dict[str, str]:
@@ -227,8 +250,7 @@ def write_csv(recording: Recording, path: str | Path, *, field: bool = False,
         chosen = {f'{name} [{recording[name].unit}]': name
                   for name in (recording.names if names is None else names)}
     channels = [recording[name] for name in chosen.values()]
-    stamps = np.unique(np.concatenate([np.empty(0, np.int64), *(c.time_ns for c in channels)]))
-    meta = {'rows': len(stamps), 'configuration': recording.configuration,
+    meta = {'rows': len(all_stamps(channels)), 'configuration': recording.configuration,
             'changes': tuple(tuple(change) for change in recording.changes),
             'notes': recording.notes}
     beside, sheet_path = meta_path(path), path.with_suffix('.yaml')
@@ -243,26 +265,18 @@ def write_csv(recording: Recording, path: str | Path, *, field: bool = False,
                 elif target == sheet_path:
                     stream.write(dump_sheet(recording.sheet).encode())
                 else:
-                    _write_rows(stream, list(chosen), channels, stamps)
+                    _write_rows(stream, list(chosen), channels)
             undo.callback(target.unlink, missing_ok=True)
         undo.pop_all()
     return tuple(targets)
 
 
-def _write_rows(stream: IO[bytes], columns: Sequence[str], channels: Sequence[Channel],
-                stamps: Any) -> None:
+def _write_rows(stream: IO[bytes], columns: Sequence[str], channels: Sequence[Channel]) -> None:
     stream.write((','.join([TIME, *columns]) + '\n').encode())
-    for first in range(0, len(stamps), _BLOCK):
-        block = stamps[first:first + _BLOCK]
-        cells = [[format_nanoseconds(stamp) for stamp in block.tolist()]]
-        for channel in channels:
-            low, high = np.searchsorted(channel.time_ns, [block[0], block[-1] + 1])
-            column = [''] * len(block)
-            places = np.searchsorted(block, channel.time_ns[low:high])
-            for place, value in zip(places.tolist(), channel.values[low:high].tolist(),
-                                    strict=True):
-                column[place] = repr(value)
-            cells.append(column)
+    for stamps, table in in_rows(channels):
+        cells = [map(format_nanoseconds, stamps.tolist()), *(
+            ['' if math.isnan(value) else repr(value) for value in column]
+            for column in table.T.tolist())]
         stream.write(('\n'.join(map(','.join, zip(*cells, strict=True))) + '\n').encode())
 
 
@@ -271,47 +285,3 @@ def format_nanoseconds(stamp: int) -> str:
     whole, rest = divmod(abs(stamp), NANOSECONDS)
     fraction = f'{rest:09d}'.rstrip('0') or '0'
     return f'{"-" if stamp < 0 else ""}{whole}.{fraction}'
-
-
-def sorted_rows(path: Path, time_column: str, stamps: IntArray, lines: IntArray,
-                columns: Iterable[Column]) -> list[Column]:
-    """
-    Return the columns with their rows in the order of time, each row once.
-
-    stamps, lines : time stamp and line of each row, shape (rows,)
-    columns : stamps and values of each column, which may lack some rows
-
-    Raises RecordingError if two rows have one time stamp and differ. Warns with RecordingWarning
-    if rows were sorted, or repeated rows left out.
-    """
-    steps = np.diff(stamps)
-    if np.any(steps < 0):
-        warnings.warn(
-            f'{path}: line {lines[1:][steps < 0][0]}: the time is earlier than in the row before; '
-            'the rows were sorted by time', RecordingWarning, stacklevel=3)
-    order = np.argsort(stamps, kind='stable')
-    stamps, lines = stamps[order], lines[order]
-    repeated = np.flatnonzero(np.diff(stamps) == 0) + 1
-    rows_at = dict(zip(*(part.tolist() for part in np.unique(stamps[repeated],
-                                                             return_counts=True))))
-    found = []
-    for column_stamps, values in columns:
-        order = np.argsort(column_stamps, kind='stable')
-        column_stamps, values = column_stamps[order], values[order]
-        again = np.flatnonzero(np.diff(column_stamps) == 0) + 1
-        # of equal rows, a value is in each or in none
-        here, counts = np.unique(column_stamps, return_counts=True)
-        twice = np.isin(here, stamps[repeated])
-        unlike = [stamp for stamp, count in zip(here[twice].tolist(), counts[twice].tolist())
-                  if count != 1 + rows_at[stamp]]
-        unlike += column_stamps[again][values[again] != values[again - 1]].tolist()
-        if unlike:
-            place = int(np.searchsorted(stamps, min(unlike)))
-            raise RecordingError(
-                f'{path}: line {lines[place + 1]}, column {time_column}: the time is that of '
-                f'line {lines[place]}, but the row is another one; remove one of them')
-        found.append((np.delete(column_stamps, again), np.delete(values, again)))
-    if repeated.size:
-        warnings.warn(f'{path}: line {lines[repeated].min()}: the row repeats an earlier one; '
-                      f'{repeated.size} such rows were left out', RecordingWarning, stacklevel=3)
-    return found

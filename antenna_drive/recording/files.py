@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Read a recording, whatever format it is in: one of ours, or what a map describes."""
 
+from functools import partial
 from pathlib import Path
 
 from antenna_drive.emulator import wiring
@@ -43,14 +44,9 @@ def read_recording(path: str | Path, *, partial: bool = False) -> Recording:
     return read_csv(path)
 
 
-def load_map(path: str | Path) -> ImportMap:
-    """Read a map whose signals may be the drive's own; errors as of `column_map.load_map`."""
-    return column_map.load_map(path, DRIVE)
-
-
-def parse_map(tree: object) -> ImportMap:
-    """Check the plain data of such a map; errors as in `load_map`."""
-    return column_map.parse_map(tree, DRIVE)
+# Of a file, or of plain data, a map whose signals may be the drive's own.
+load_map = partial(column_map.load_map, known=DRIVE)
+parse_map = partial(column_map.parse_map, known=DRIVE)
 
 
 def import_file(path: str | Path, import_map: ImportMap) -> Recording:

@@ -12,7 +12,7 @@ Time is kept in whole nanoseconds, as in ROS 2 and MCAP, so that stamps survive 
 format exactly and equal stamps compare equal; `time_s` gives seconds for computing.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 import math
 from types import MappingProxyType
@@ -27,8 +27,12 @@ from simgap.errors import one_line
 from simgap.inputs.plain import PlainDataError
 from simgap.inputs.schema import nearest
 from simgap.logs.channel import (
-    Channel, check_name, make_channel, NANOSECONDS, nanoseconds, RecordingError,
+    Channel, check_name, FloatArray, IntArray, make_channel, NANOSECONDS, nanoseconds,
+    RecordingError,
 )
+
+
+_BLOCK = 65536  # stamps that are looked at together
 
 
 def unit_of(name: str) -> str:
@@ -53,6 +57,29 @@ class Change(NamedTuple):
     step: int
     unit: str
     values: Mapping[str, Any]
+
+
+def all_stamps(channels: Sequence[Channel]) -> IntArray:
+    """Return every time stamp of the channels once, in order, shape (n,) [ns]."""
+    return np.unique(np.concatenate([np.empty(0, np.int64), *(c.time_ns for c in channels)]))
+
+
+def in_rows(channels: Sequence[Channel]) -> Iterator[tuple[IntArray, FloatArray]]:
+    """
+    Yield the samples in the order of time, many stamps together.
+
+    Each time the stamps [ns], shape (n,), and the values of the channels at them, shape (n,
+    channels), NaN where there is no sample.
+    """
+    stamps = all_stamps(channels)
+    for first in range(0, len(stamps), _BLOCK):
+        block = stamps[first:first + _BLOCK]
+        table = np.full((len(block), len(channels)), np.nan)
+        for column, channel in enumerate(channels):
+            low, high = np.searchsorted(channel.time_ns, [block[0], block[-1] + 1])
+            places = np.searchsorted(block, channel.time_ns[low:high])
+            table[places, column] = channel.values[low:high]
+        yield block, table
 
 
 @dataclass(frozen=True)

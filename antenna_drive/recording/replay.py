@@ -36,24 +36,44 @@ _AROUND = 9
 Changes = dict[int, dict[str, Mapping[str, Value]]]
 
 
-class CommandUnit(Unit):
+class LaidCommand(Unit):
+    """In the place of the test signal, a command that is laid onto the macro-steps."""
+
+    outputs: ClassVar[tuple[Signal, ...]] = _OUTPUTS
+
+    def __init__(self) -> None:
+        """Command zero until something is laid."""
+        super().__init__(wiring.TEST_SIGNAL)
+        self.lay(np.zeros((1, len(_OUTPUTS), 2)), 0)
+
+    def lay(self, table: FloatArray, first: int) -> None:
+        """Take value and slope of each output at the steps from `first` on; the last one holds."""
+        self._table, self._first = table, first
+
+    def start(self, step_s: float) -> FloatArray:
+        """Give the first row; see `Unit.start`."""
+        return np.array(self._table[0])
+
+    def step(self, k: int, inputs: FloatArray) -> FloatArray:
+        """Give the row of t_k+1; see `Unit.step`."""
+        return np.array(self._table[min(k + 1 - self._first, len(self._table) - 1)])
+
+
+class CommandUnit(LaidCommand):
     """
     The test signal of a replay: it plays what was recorded, and holds the last value at the end.
 
     It takes the place of the drive's own test signal, in one process or as a node.
     """
 
-    outputs: ClassVar[tuple[Signal, ...]] = _OUTPUTS
-
     def __init__(self, recording: Recording) -> None:
         """Take a recording's rate command and, if there, torque; RecordingError if none."""
-        super().__init__(wiring.TEST_SIGNAL)
+        super().__init__()
         if COMMAND not in recording or not len(recording[COMMAND]):
             raise RecordingError(f'{COMMAND}: not in this recording, there is nothing to replay')
         self._channels = [recording.channels.get(name) for name in (COMMAND, TORQUE)]
         self.start_ns = int(recording[COMMAND].time_ns[0])
         self._end_ns = int(recording[COMMAND].time_ns[-1])
-        self._table = np.zeros((1, len(self.outputs), 2))
 
     def last_step(self, step_s: float) -> int:
         """Return the last macro-step of `step_s` [s] that the command covers."""
@@ -62,16 +82,13 @@ class CommandUnit(Unit):
     def start(self, step_s: float) -> FloatArray:
         """Lay the command onto the macro-steps and give the first; see `Unit.start`."""
         times = self.start_ns + nanoseconds(np.arange(self.last_step(step_s) + 1) * step_s)
-        self._table = np.zeros((len(times), len(self.outputs), 2))
+        table = np.zeros((len(times), len(self.outputs), 2))
         for row, channel in enumerate(self._channels):
             if channel is not None and len(channel):
-                self._table[:, row] = command_table(channel, times)
-        self._table[-1, :, 1] = 0.0
-        return self._table[0].copy()
-
-    def step(self, k: int, inputs: FloatArray) -> FloatArray:
-        """Give the row of t_k+1; see `Unit.step`."""
-        return self._table[min(k + 1, len(self._table) - 1)].copy()
+                table[:, row] = command_table(channel, times)
+        table[-1, :, 1] = 0.0
+        self.lay(table, 0)
+        return super().start(step_s)
 
 
 def command_table(channel: Channel, times_ns: Any) -> FloatArray:

@@ -8,15 +8,13 @@ line between samples, and at a jump as before up to the sample after it. Whether
 is judged by the slopes around it. The shadow therefore stays a few samples behind the newest one.
 """
 
-from typing import ClassVar
-
 from antenna_drive.diagnosis.sheet_settings import as_the_sheet_says
 from antenna_drive.emulator import units, wiring
 from antenna_drive.emulator.run import Changes, Emulator, MACRO_STEP
-from antenna_drive.emulator.unit import FloatArray, Signal, Unit
+from antenna_drive.emulator.unit import FloatArray
 from antenna_drive.parameters.sets import changed, Drive
 from antenna_drive.physics.arrays import IntArray
-from antenna_drive.recording.replay import command_table
+from antenna_drive.recording.replay import command_table, LaidCommand
 from antenna_drive.recording.sheet import TestSheet
 import numpy as np
 from simgap.logs.channel import Channel, NANOSECONDS, nanoseconds
@@ -25,32 +23,6 @@ from simgap.logs.channel import Channel, NANOSECONDS, nanoseconds
 AHEAD = 5
 # So many samples before it do, too.
 _BEHIND = 40
-
-
-class _CommandSource(Unit):
-    """Puts out the command that was laid onto the next macro-steps."""
-
-    outputs: ClassVar[tuple[Signal, ...]] = wiring.OUTPUTS[wiring.TEST_SIGNAL]
-
-    def __init__(self) -> None:
-        super().__init__(wiring.TEST_SIGNAL)
-        self.begin(np.zeros(2), 0)
-
-    def begin(self, first: FloatArray, k: int) -> None:
-        self._table, self._first = np.zeros((1, len(self.outputs), 2)), k
-        self._table[0, 0] = first
-
-    def lay(self, table: FloatArray, first: int) -> None:
-        """Take the rows of the steps from `first` on, shape (n, 2)."""
-        self._table = np.zeros((len(table), len(self.outputs), 2))
-        self._table[:, 0] = table
-        self._first = first
-
-    def start(self, step_s: float) -> FloatArray:
-        return np.array(self._table[0])
-
-    def step(self, k: int, inputs: FloatArray) -> FloatArray:
-        return np.array(self._table[k + 1 - self._first])
 
 
 class Shadow:
@@ -65,7 +37,7 @@ class Shadow:
     def __init__(self, drive: Drive, changes: Changes | None = None,
                  step_s: float = MACRO_STEP) -> None:
         """Build the drive; it begins with the first command."""
-        self._command = _CommandSource()
+        self._command = LaidCommand()
         others = {name: units.build(name, drive) for name in wiring.UNITS
                   if name != wiring.TEST_SIGNAL}
         self._emulator = Emulator(drive, step_s, {**others, wiring.TEST_SIGNAL: self._command})
@@ -105,7 +77,7 @@ class Shadow:
             return nothing
         if self.start_ns is None:
             self.start_ns = int(self._stamps[0])
-            self._command.begin(np.array([self._values[0], 0.0]), 0)
+            self._lay(np.array([[self._values[0], 0.0]]), 0)
             self._emulator.restart()
         done = self._emulator.k
         end = int((self._stamps[-AHEAD] - self.start_ns) / NANOSECONDS / self._step_s)
@@ -113,12 +85,18 @@ class Shadow:
             return nothing
         channel = Channel('rad/s', self._stamps, self._values)
         grid = self.start_ns + nanoseconds(np.arange(done + 1, end + 1) * self._step_s)
-        self._command.lay(command_table(channel, grid), done + 1)
+        self._lay(command_table(channel, grid), done + 1)
         kept = [self._advance_to(stop) for stop in sorted(
             {*(k for k in self._changes if done < k < end), end})]
         before = max(0, int(np.searchsorted(self._stamps, grid[-1])) - _BEHIND)
         self._stamps, self._values = self._stamps[before:], self._values[before:]
         return grid, np.concatenate(kept)
+
+    def _lay(self, command: FloatArray, first: int) -> None:
+        """Lay a rate command, shape (n, 2), onto the steps from `first` on; there is no torque."""
+        table = np.zeros((len(command), len(self._command.outputs), 2))
+        table[:, 0] = command
+        self._command.lay(table, first)
 
     def _advance_to(self, stop: int) -> FloatArray:
         if self._emulator.k in self._changes:

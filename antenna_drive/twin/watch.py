@@ -184,7 +184,8 @@ class Twin:
                                 course.raw)[:, SIGNALS.index(name)]
             residual = values - twin
             if SIGNALS.index(name) == ENCODER:
-                residual = self._publish_wash(residual, _spacing(times))
+                spacing = float(np.median(np.diff(times))) if times.size > 1 else 0.01
+                residual = self._publish_wash(residual, spacing)
             result.append(Compared(name, stamps, twin, residual))
             old = self._pending[name]
             self._pending[name] = (np.append(old[0], times), np.append(old[1], values))
@@ -267,10 +268,6 @@ class Twin:
     def gaps(self) -> list[Gap]:
         """Return which signals are apart from the twin, the greatest first."""
         return self.judge.gaps(self._shadow.start_ns or 0)
-
-
-def _spacing(times: FloatArray) -> float:
-    return float(np.median(np.diff(times))) if times.size > 1 else 0.01
 
 
 def _stands_at_first(recording: Recording) -> bool:

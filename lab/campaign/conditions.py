@@ -259,7 +259,7 @@ def _many_drives(outcome: Outcome, options: Mapping[str, Any], rng: random.Rando
 
 def _slow_observer(outcome: Outcome, options: Mapping[str, Any], rng: random.Random,
                    folder: Path) -> None:
-    guest = (sys.executable, '-m', MEMBERS, 'observer', 'guest', '0.05')
+    guest = (sys.executable, '-m', MEMBERS, 'observer', '0.05')
     with Rig(outcome, folder / 'bags', recorder=True, commands={'guest': guest}, pace=0.0,
              settings=random_settings(rng), nap_s=5e-3) as rig:
         rig.start()

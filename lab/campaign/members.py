@@ -4,7 +4,7 @@
 Members of a drive beside its nodes, each a process: a recorder and an observer.
 
   python -m lab.campaign.members recorder FOLDER --ros-args -r __node:=NAME
-  python -m lab.campaign.members observer [guest] [SECONDS] --ros-args -r __node:=NAME
+  python -m lab.campaign.members observer [SECONDS] --ros-args -r __node:=NAME
 
 The recorder writes to a new folder in FOLDER at each start, as a supervisor would restart it. The
 observer takes SECONDS for each step.
@@ -37,8 +37,7 @@ def main(arguments: list[str]) -> int:
 
 def _observe(own: list[str], ros: str) -> int:
     from antenna_drive.lockstep.observer import Observer
-    guest = 'guest' in own
-    nap_s = sum(float(word) for word in own if word != 'guest')
+    nap_s = sum(map(float, own))
     ended = False
 
     def end(number: int, frame: FrameType | None) -> None:
@@ -49,7 +48,7 @@ def _observe(own: list[str], ros: str) -> int:
         signal.signal(number, end)
     name, namespace = (re.search(rf'__{key}:=(\S+)', ros) for key in ('node', 'ns'))
     assert name is not None
-    with Observer(name[1], lambda step, time_s, samples: time.sleep(nap_s), guest=guest,
+    with Observer(name[1], lambda step, time_s, samples: time.sleep(nap_s),
                   namespace=namespace[1] if namespace else '') as observer:
         observer.spin(lambda: ended)
         if observer.lost:

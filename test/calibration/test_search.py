@@ -148,12 +148,6 @@ def test_the_report_tells_what_is_determined(monkeypatch: pytest.MonkeyPatch) ->
     assert all(point['cost_of_the_others'] >= 0.0 for point in curve)
     cheapest = min(curve, key=lambda point: point['cost_of_the_others'])
     assert cheapest['missed'] == []
-    # a better candidate of another search is used
-    other = FitCandidate((0.5, 0.5, 0.5), Evaluation(0.0, {
-        'sum': cheapest['level'] + 1e-6, 'difference': float(SLOPES[1] @ BEST)}, True))
-    curve = report(problem, found, ['sum'],  # type: ignore[arg-type]
-                   also=[other])['trade_offs']['sum']
-    assert min(point['cost_of_the_others'] for point in curve) == 0.0
     with pytest.raises(ParameterError, match='no such target, did you mean sum'):
         report(problem, found, ['sums'])  # type: ignore[arg-type]
 

@@ -5,13 +5,14 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from antenna_drive.article.experiments import experiments
 from antenna_drive.emulator.run import simulate
 from antenna_drive.emulator.units import build, overridden
 from antenna_drive.emulator.wiring import UNITS
 from antenna_drive.live.experiment_buttons import levels, listed, plan, preview, start_of
-from antenna_drive.live.parameter_table import Description, entry_of, reach
+from antenna_drive.live.parameter_table import entry_of, reach
 from antenna_drive.parameters import load
 from antenna_drive.parameters.sets import changed
 import numpy as np
@@ -19,17 +20,15 @@ import pytest
 from simgap.inputs.schema import ParameterError
 
 
-def described(unit: str) -> list[tuple[Description, object]]:
+def described(unit: str) -> list[tuple[Any, object]]:
     """Return descriptors of a unit's parameters, as its node gives them, with their values."""
     pytest.importorskip('rclpy', reason='rclpy is not installed: there are no descriptors')
     from antenna_drive.lockstep.ros_parameters import describe
-    found: list[tuple[Description, object]] = []
+    found: list[tuple[Any, object]] = []
     for name, (entry, value) in build(unit, load()).settings().items():
         item = describe(entry)
-        ends = [(part.from_value, part.to_value) for part in item.floating_point_range]
-        low, high = ends[0] if ends else (None, None)
-        found.append((Description(name, item.description, item.additional_constraints,
-                                  item.read_only, low, high), value))
+        item.name = name
+        found.append((item, value))
     return found
 
 

@@ -125,7 +125,7 @@ class Watch:
 class Recorder:
     """Every sample and every change of a drive, gathered in a thread."""
 
-    def __init__(self, name: str = 'watcher', namespace: str = '', guest: bool = False,
+    def __init__(self, name: str = 'watcher', namespace: str = '',
                  outputs: Mapping[str, Sequence[Signal]] = OUTPUTS) -> None:
         self.samples: list[FloatArray] = []
         self.changes: list[tuple[str, Mapping[str, Any]]] = []
@@ -134,7 +134,7 @@ class Recorder:
         self.first = 0
         self._stop = Event()
         self.observer = Observer(name, self._keep, on_begin=self._begin,
-                                 on_change=self._note, namespace=namespace, guest=guest,
+                                 on_change=self._note, namespace=namespace,
                                  outputs=outputs)
         self._thread = Thread(target=self.observer.spin, args=(self._stop.is_set,))
         self._thread.start()

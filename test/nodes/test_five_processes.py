@@ -326,7 +326,7 @@ def test_a_guest_joins_late_at_real_time_pace_and_loses_nothing() -> None:
     with Watch() as watch, DriveProcesses(
             {'test_signal': {'run.pace': 0.5, 'run.step': 2e-3}}) as processes:
         watch.until(lambda: int(watch.value('plant', 'step') or 0) > 1200, 'step 1200')
-        with Recorder('guest', guest=True) as recorder:
+        with Recorder('guest') as recorder:
             watch.until(lambda: _at_step(recorder, processes, 1500), '1500 steps')
             lost, first, samples = recorder.observer.lost, recorder.first, recorder.array()
     assert not lost

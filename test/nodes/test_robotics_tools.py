@@ -25,11 +25,10 @@ pytest.importorskip('rclpy', reason='rclpy is not installed: no drive to look at
 pytest.importorskip('tornado', reason='tornado is not installed: no client')
 pytest.importorskip('foxglove', reason='foxglove-sdk is not installed')
 
-from antenna_drive.lockstep.following import Thinned  # noqa: E402, I100
+from antenna_drive.lockstep.readings import steps_between  # noqa: E402, I100
 from antenna_drive.nodes.joint_states_node import axis_state, motor_states  # noqa: E402
 from drive_watch import Watch  # noqa: E402
 from live_command import LiveCommand  # noqa: E402
-import numpy as np  # noqa: E402
 from rclpy.serialization import serialize_message  # noqa: E402
 from rosbags.typesys import get_typestore, Stores  # noqa: E402
 from rosgraph_msgs.msg import Clock  # noqa: E402
@@ -47,21 +46,29 @@ READINGS = ('plant/encoder', 'plant/axis_rate', 'motor_1/tach_rate', 'motor_2/ta
 
 
 def test_joints_are_as_another_reader_of_ros_messages_reads_them() -> None:
-    step = Thinned(1795262948317196, 2_000_500, 1e-3, {
-        # the order of signals is that of README.md, Topics
-        'plant': np.array([0.1, 0.2, 0.3, 0.4, 0.5, 0.6]),
-        'motor_1': np.array([1.1, 1.2, 1.3, 1.4, 1.5]),
-        'motor_2': np.array([2.1, 2.2, 2.3, 2.4, 2.5])})
+    time_s, values = 2_000_500 * 1e-3, {
+        'plant/axis_rate': 0.2, 'plant/encoder': 0.3,
+        'motor_1/gear_torque': 1.2, 'motor_1/tach_rate': 1.4,
+        'motor_2/gear_torque': 2.2, 'motor_2/tach_rate': 2.4}
     read: Any = get_typestore(Stores.ROS2_KILTED)
     axis, motors = (read.deserialize_cdr(serialize_message(state), 'sensor_msgs/msg/JointState')
-                    for state in (axis_state(step, 'axis', 100.0), motor_states(step, ['a', 'b'])))
+                    for state in (axis_state(time_s, values, 'axis', 100.0),
+                                  motor_states(time_s, values, ['a', 'b'])))
     for state in (axis, motors):
         assert (state.header.stamp.sec, state.header.stamp.nanosec) == (2000, 500_000_000)
     assert (axis.name, axis.position.tolist(), axis.velocity.tolist()) == (['axis'], [0.3], [0.2])
     assert axis.effort.tolist() == pytest.approx([340.0])
     assert (motors.name, motors.position.tolist()) == (['a', 'b'], [])
     assert (motors.velocity.tolist(), motors.effort.tolist()) == ([1.4, 2.4], [1.2, 2.2])
-    assert list(axis_state(step, 'axis', None).effort) == [], 'the plant has not told its ratio'
+    untold = axis_state(time_s, values, 'axis', None)
+    assert list(untold.effort) == [], 'the plant has not told its ratio'
+
+
+@pytest.mark.parametrize(('step_s', 'rate_hz', 'every'), [
+    (1e-3, 50.0, 20), (1e-3, 1e4, 1), (2e-3, 300.0, 2), (0.05, 0.5, 40)])
+def test_the_nearest_rate_that_the_steps_allow_is_taken(
+        step_s: float, rate_hz: float, every: int) -> None:
+    assert steps_between(rate_hz, step_s) == every
 
 
 @pytest.mark.parametrize(('argument', 'said'), [
