@@ -53,12 +53,16 @@ def disturbed(place_name: str, strength: float, seed: int, fastest: float = 1.5)
 def test_part_that_something_unknown_enters_is_told(name: str, strength: float,
                                                     component: str) -> None:
     """The input is no pulse, and its answer is not linear: the part is found all the same."""
-    found = places(LeastSquares(disturbed(name, strength, seed=3)), {})
-    shares = components(found, DEFAULT.localisation.caution)
-    # an amplifier's voltage and its tachometer's reading look alike
-    assert shares[component] > 0.3 * max(shares.values())
-    assert sum(shares.values()) == pytest.approx(1.0)
-    assert found[0].evidence > 100.0 and 2.0 * DEFAULT.verdict.left < found[0].explained <= 1.0
+    told = 0
+    for seed in (3, 4, 5, 6):
+        found = places(LeastSquares(disturbed(name, strength, seed=seed)), {})
+        shares = components(found, DEFAULT.localisation.caution)
+        assert sum(shares.values()) == pytest.approx(1.0)
+        assert found[0].evidence > 100.0 and 2.0 * DEFAULT.verdict.left < found[0].explained <= 1.0
+        # an amplifier's voltage and its tachometer's reading look alike
+        told += shares[component] > 0.3 * max(shares.values())
+    # where the drive sticks, no sum of answers tells the part
+    assert told >= 3
 
 
 @pytest.mark.parametrize('seed', [3, 4, 5])
