@@ -25,8 +25,9 @@ def answered(course: FloatArray) -> FloatArray:
 class TwoLags(Machine):
     """Two lags side by side, each seen by a sensor of its own; regimes are the halves."""
 
-    disturbance_inputs = (DisturbanceInput('force on the left', 'left'),
-                          DisturbanceInput('force on the right', 'right'))
+    disturbance_inputs: tuple[DisturbanceInput, ...] = (
+        DisturbanceInput('force on the left', 'left'),
+        DisturbanceInput('force on the right', 'right'))
     time_scales = TimeScales(1.0, 5.0, 0.15, 1.5, 1.0)
 
     def __init__(self, left: FloatArray, right: FloatArray) -> None:

@@ -140,7 +140,7 @@ class Overrides:
     def text(self, name: str, default: str = '') -> str:
         """Return the text given for a parameter, or its default; raise as `names` does."""
         given = self.names(name, [default])
-        if len(given) > 1:
+        if len(given) > 1 or self._values.get(name) == []:
             raise ParameterError(f'{name}: {given!r} given, allowed is one text')
         return ''.join(given)
 

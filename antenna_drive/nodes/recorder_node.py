@@ -49,7 +49,7 @@ class _RecorderNode:
     def __init__(self, node: Node) -> None:
         self._log = node.get_logger()
         overrides = Overrides(node)
-        out = overrides.text('out', f'recording_{datetime.now():%Y-%m-%d_%H-%M-%S}')
+        out = overrides.text('out') or f'recording_{datetime.now():%Y-%m-%d_%H-%M-%S}'
         sheet = overrides.text('sheet')
         sync_s = overrides.number('sync', _TIME, 0.0)  # 0: at the end of each storage file
         split_s = overrides.number('split', _TIME, SPLIT_S)  # 0: never

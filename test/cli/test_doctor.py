@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from importlib import metadata
 import importlib.util
 import json
 from pathlib import Path
@@ -112,7 +113,7 @@ def test_every_extra_is_a_part(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_versions(monkeypatch: pytest.MonkeyPatch, version: str, bounds: str,
                   fits: bool) -> None:
     """As PEP 440 has it, for the bounds that are used here."""
-    monkeypatch.setattr(health.metadata, 'version', lambda name: version)
+    monkeypatch.setattr(metadata, 'version', lambda name: version)
     found = health._library('physics', 'numpy', {'numpy': bounds})
     assert (found.state, found.found.partition(',')[0]) == ('ok' if fits else 'broken', version)
 

@@ -129,8 +129,8 @@ class Promising(Loads):
 @pytest.mark.parametrize('kept, family', [(1.0, 'great'), (1e-3, 'modest')])
 def test_where_a_family_breaks_its_promises_another_one_is_proposed(
         kept: float, family: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    def broken(machine: Lever, *rest: Any, fitted: bool = True) -> Separation:
-        told = separation(machine, *rest, fitted=fitted)
+    def broken(machine: Lever, rivals: Any, inflated: float, fitted: bool = True) -> Separation:
+        told = separation(machine, rivals, inflated, fitted)
         share = kept if fitted and machine.load > 1.0 else 1.0
         return replace(told, lack=share * told.lack)
 

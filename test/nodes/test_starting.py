@@ -61,7 +61,7 @@ def started(log: IO[bytes], node: str, *arguments: str) -> Iterator[None]:
 @pytest.mark.usefixtures('node_domain')
 @pytest.mark.parametrize(('node', 'arguments', 'waits'), [
     ('recorder', (), f'the frames of {", ".join(UNITS)}'),
-    ('joint_states', (), 'the frames of plant, motor_1, motor_2'),
+    ('joint_states', (), f'the frames of {", ".join(UNITS)}'),
     pytest.param('twin', ('--ros-args', '-p', 'real:=/east', '-p', 'verdict:=false'),
                  ', '.join(f'/east/{signal}' for signal in (
                      'test_signal/rate_command', 'motor_1/ammeter', 'motor_2/ammeter',
