@@ -81,15 +81,13 @@ class Evidence:
     def price(self, forms: Sequence[Form]) -> float:
         """Return what a hypothesis has to pay for effects of these forms."""
         sought = self.settings.sought * sum(form.scanned for form in forms)
-        noise = self.scale ** 2
-        gap = (self.gain + 0.5 * self.samples / noise) / self.temperature
-        return sought + len(forms) * (
-            self.settings.shows / noise + self.settings.form_error ** 2 * gap)
+        shows = self.settings.shows / self.scale ** 2
+        return len(forms) * (shows + self.settings.form_error ** 2 * self.whole) + sought
 
     @property
     def whole(self) -> float:
         """Return the whole gap: what the best gains and what it leaves [half chi-square]."""
-        return self.gain / self.temperature + 0.5 * self.samples
+        return self.gain / self.temperature + 0.5 * self.samples / self.scale ** 2
 
     def ranked(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
         """Return hypotheses, the best first."""

@@ -118,7 +118,7 @@ def test_a_size_without_a_prior_has_that_of_a_single_sample(bounds: tuple[float,
 
 @pytest.mark.parametrize('times', [4, 25])
 def test_samples_that_only_repeat_others_count_no_more(times: int) -> None:
-    """Each sample so many times, at a temperature as high, is the sample once."""
+    """Each sample so many times, at a temperature as high, is the sample once, but for prices."""
     one = machine(1, {'a.size': 0.5, 'c.size': -1.0})
     many = Linear(np.repeat(one.experiments[0].measured[:, 0], times),
                   np.repeat(one.columns, times, axis=0))
@@ -126,7 +126,8 @@ def test_samples_that_only_repeat_others_count_no_more(times: int) -> None:
     for model, tempered in ((one, 1.0), (many, float(times))):
         problem = LeastSquares(model, settings=TO_THE_END)
         evidence = plain(problem, tempered)
-        found.append([evidence(fitted(problem, effects)) for effects in ('ac', 'acd', 'abc')])
+        fits = [fitted(problem, effects) for effects in ('ac', 'acd', 'abc')]
+        found.append([evidence(fit) + evidence.price(fit.forms) for fit in fits])
     # the prior moves the optimum of the repeated samples less
     assert found[1] == pytest.approx(found[0], abs=0.1)
 
