@@ -3,9 +3,10 @@
 """
 Noise of the process, such as wind: it moves the machine, and so shows in all readings at once.
 
-Its covariance U U^T, with U of `Experiment.process`, stands beside that of the sensors. Nothing of
-it is fitted: residuals are made white under the sum of both. In the eigenvectors of that sum where
-the sensors' noise is white, a residual counts by 1 / (1 + s^2), with the process' deviation s.
+Its covariance U K U^T, with responses U to pulses and the covariance K of their heights, is added
+to that of the sensors. Nothing is fitted: residuals are made white under the sum. Where the
+sensors' noise is white, a residual along an eigenvector counts by 1 / (1 + s^2), with the
+process' deviation s.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ _LEAST = 0.1
 class ProcessNoise:
     """Noise of the process in readings whose sensors' noise is white and of variance 1."""
 
-    responses: sparse.csr_array  # to pulses, which end soon, shape (n, m)
+    responses: sparse.csr_array  # to pulses, most of which end soon, shape (n, m)
     transposed: sparse.csr_array  # the same, shape (m, n)
     turns: NDArray[np.float32]  # of them into orthonormal directions, shape (m, k)
     deviations: FloatArray  # of the process in these, shape (k,)

@@ -10,7 +10,6 @@ sum says what follows. How far sums hold is seen from random courses (statistica
 R. C. Booton, IRE Transactions on Circuit Theory 1, 9, 1954).
 """
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -63,14 +62,14 @@ def calm(experiment: Experiment) -> Experiment:
 def _of_place(machine: Machine, point: Point, place: DisturbanceInput) -> list[ProcessResponses]:
     found = answers(machine, point, place, place.everyday, _FINER)
     longest = max((own.times for own in found), key=len)
-    factor, random = _root(longest.size), np.random.default_rng(0)
-    draws = [factor @ random.standard_normal(longest.size) for _ in range(_DRAWS)]
+    random = np.random.default_rng(0)
+    draws = _root(longest.size) @ random.standard_normal((_DRAWS, longest.size)).T
     still = [machine.predict(point, k) for k in range(len(found))]
     seen = [[np.nan_to_num(one - none) for one, none in zip(machine.simulate_disturbed(
         point, place, lambda time: place.everyday * np.interp(time, longest, heights)), still,
-        strict=True)] for heights in draws]
-    return [_linearised(own, [own.summed(heights[:own.times.size], len(still[k]))
-                              for heights in draws], [row[k] for row in seen],
+        strict=True)] for heights in draws.T]
+    return [_linearised(own, own.summed(draws[:own.times.size], len(still[k])),
+                        np.stack([row[k] for row in seen], axis=-1),
                         2.0 * machine.time_scales.response_s / float(
                             np.median(np.diff(machine.experiments[k].time))))
             for k, own in enumerate(found)]
@@ -81,18 +80,16 @@ def _root(count: int) -> FloatArray:
     return root(count, np.geomspace(1.0, count, _TIMES))
 
 
-def _linearised(own: Answers, summed: Sequence[FloatArray], seen: Sequence[FloatArray],
+def _linearised(own: Answers, summed: FloatArray, seen: FloatArray,
                 window: float) -> ProcessResponses:
-    """Return answers in so far as their sums, shape (n, c) each, say what was seen."""
-    def mean(products: Sequence[FloatArray]) -> FloatArray:
+    """Return answers in so far as their sums say what was seen; both have the shape (n, c, d)."""
+    def mean(products: FloatArray) -> FloatArray:
         # a running sum may end a little below zero
         return np.asarray(uniform_filter1d(
-            np.mean(products, axis=0), max(int(window), 1), axis=0)).clip(0.0)
+            products.mean(axis=-1), max(int(window), 1), axis=0)).clip(0.0)
 
-    both = mean([one * other for one, other in zip(summed, seen, strict=True)])
-    power = mean([one ** 2 for one in summed])
-    share = np.clip(both / np.maximum(power, 1e-30), 0.0, 1.0)
-    beyond = mean([(other - share * one) ** 2 for one, other in zip(summed, seen, strict=True)])
+    share = np.clip(mean(summed * seen) / np.maximum(mean(summed ** 2), 1e-30), 0.0, 1.0)
+    beyond = mean((seen - share[..., np.newaxis] * summed) ** 2)
     return ProcessResponses(
         [replace(part, values=part.values * part.during(share)) for part in own.parts],
         own.mixed @ _root(own.times.size), np.sqrt(beyond))
