@@ -162,6 +162,8 @@ class Reception:
                     # While the slowest is waited for, the frames of the others come.
                     member.inbox.put_first(peer)
             member.receive(peer, frame)
+            if peer not in member.inbox.stepping:
+                self.take_some(peer)
         return bool(missing) or not self._paced
 
     def take_some(self, peer: str) -> None:
