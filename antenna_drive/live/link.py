@@ -27,11 +27,11 @@ from antenna_drive.lockstep.leaving import leave
 from antenna_drive.lockstep.observer import Observer
 from antenna_drive.lockstep.run_control import RunState
 from diagnostic_msgs.msg import DiagnosticArray
-from rcl_interfaces.msg import Parameter as ParameterMessage, ParameterEvent
+from rcl_interfaces.msg import Parameter as ParameterMessage, ParameterEvent, ParameterValue
 from rcl_interfaces.srv import (
     DescribeParameters, GetParameters, ListParameters, SetParametersAtomically,
 )
-from rclpy.parameter import Parameter, parameter_value_to_python
+from rclpy.parameter import Parameter
 from simgap.errors import UserError
 from std_srvs.srv import Trigger
 
@@ -40,6 +40,8 @@ PERIOD_S = 0.05
 _REMEMBERED = 60
 
 _UNITS = tuple(OUTPUTS)
+_KINDS = ('', 'bool_value', 'integer_value', 'double_value', 'string_value', 'byte_array_value',
+          'bool_array_value', 'integer_array_value', 'double_array_value', 'string_array_value')
 
 
 class DriveLink:
@@ -115,8 +117,7 @@ class DriveLink:
         if unit is None:
             return
         # what is no setting of the unit, as run.pace, is in no record of changes
-        values = {item.name: parameter_value_to_python(item.value)
-                  for item in event.changed_parameters}
+        values = {item.name: _plain(item.value) for item in event.changed_parameters}
         self._own[unit].update(values)
         self._board.post(f'own {unit}', {'unit': unit, 'values': self._own[unit]})
 
@@ -175,7 +176,7 @@ class DriveLink:
                               DescribeParameters.Request(names=names), unit)
         got = await ask(self._clients[unit, 'get_parameters'],
                         GetParameters.Request(names=names), unit)
-        values = dict(zip(names, map(parameter_value_to_python, got.values)))
+        values = dict(zip(names, map(_plain, got.values)))
         self.settings[unit].update(values)
         self._board.post(f'parameters {unit}', {
             'unit': unit, 'entries': [entry_of(item, values[item.name])
@@ -203,6 +204,13 @@ class DriveLink:
         """
         answer = await ask(self._triggers[service], Trigger.Request(), TEST_SIGNAL)
         return bool(answer.success), str(answer.message)
+
+
+def _plain(value: ParameterValue) -> Any:
+    if not 0 < value.type < len(_KINDS):
+        return None
+    found = getattr(value, _KINDS[value.type])
+    return list(found) if value.type >= 5 else found
 
 
 def _message(name: str, value: Any) -> ParameterMessage:
