@@ -14,7 +14,7 @@ from typing import Any
 
 from antenna_drive.lockstep.frame import FrameLayout, read_foreign
 from antenna_drive.lockstep.member import BRIEF_WAIT_S, Member, MEMORY
-from rclpy.callback_groups import CallbackGroup
+from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.duration import Duration
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.node import Node
@@ -36,17 +36,11 @@ FRAME_QOS = remembered(MEMORY)
 READ_QOS = remembered(2 * MEMORY)
 
 
-class NotForExecutors(CallbackGroup):  # type: ignore[misc]
+class NotForExecutors(ReentrantCallbackGroup):  # type: ignore[misc]
     """The group of the subscriptions that no executor may serve."""
 
     def can_execute(self, entity: Any) -> bool:
         return False
-
-    def beginning_execution(self, entity: Any) -> bool:
-        return False
-
-    def ending_execution(self, entity: Any) -> None:
-        pass
 
 
 def unserved(node: Node, kind: Any, topic: str, qos: QoSProfile, raw: bool = False) -> Any:
