@@ -18,7 +18,6 @@ from typing import Any
 from antenna_drive.article import loaded_axis, static_profile
 from antenna_drive.article.experiments import GAINS, LAGS, SAW_TOOTH
 from antenna_drive.article.measures import NEW_CIRCUIT, OLD_CIRCUIT, Results
-from antenna_drive.article.profile_measures import loaded_axis as loop_of_load
 from antenna_drive.article.static_profile import as_in_the_text, bias_voltage, NEW_GAIN
 from antenna_drive.pages import render
 from antenna_drive.parameters.sets import changed, TorqueShare
@@ -88,7 +87,7 @@ def _loaded(results: Results, circuit: str) -> Figure:
     drive = results.drives[circuit]
     load = np.linspace(-100.0, 100.0, 801)
     for axis, share in zip(axes[:, 0], loaded_axis.SHARES):
-        loop = loop_of_load(drive, circuit, share)
+        loop = loaded_axis.loaded(drive, circuit, share)
         for motor, colour in ((0, _BLUE), (1, _RED)):
             for rising, style in ((True, '-'), (False, _DASHED)):
                 axis.plot(np.where(loop.rising == rising, loop.load, np.nan),

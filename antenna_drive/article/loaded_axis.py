@@ -8,6 +8,7 @@ follow. The torques by Eq. (14) alone, for the same load, are given for comparis
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 from antenna_drive.article.experiments import DriveExperiment
 from antenna_drive.article.static_profile import bias_voltage
@@ -61,6 +62,8 @@ def bias_pot(drive: Drive, share: float) -> float:
             * drive.torque_share.filter_1.difference_gain / greatest)
 
 
+# Six cycles of one parameter set, and the same for a second one: figures and drawings share them.
+@lru_cache(maxsize=12)
 def loaded(drive: Drive, circuit: str, share: float) -> LoadedAxis:
     """
     Simulate the drive while the load rises and falls.

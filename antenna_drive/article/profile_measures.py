@@ -3,10 +3,10 @@
 """T5: figures of the static bias profile (Figs. 15, 16) and of the loaded axis (Figs. 2, 17)."""
 
 from collections.abc import Callable
-from functools import lru_cache, partial
+from functools import partial
 
 from antenna_drive.article import static_profile
-from antenna_drive.article.loaded_axis import bias_at_rest, fade_out, loaded, LoadedAxis, SHARES
+from antenna_drive.article.loaded_axis import bias_at_rest, fade_out, loaded, SHARES
 from antenna_drive.article.measures import Measure, ModelFigure, NEW_CIRCUIT, OLD_CIRCUIT, Results
 from antenna_drive.article.static_profile import (
     as_in_the_text, corners, NEW_GAIN, TEXT_FADE_OUT, TEXT_GAIN,
@@ -70,15 +70,8 @@ def profile_measures() -> dict[str, Measure]:
             for name, unit, figure, circuit in figures}
 
 
-# Six cycles of one parameter set, and the same for a second one.
-@lru_cache(maxsize=12)
-def loaded_axis(drive: Drive, circuit: str, share: float) -> LoadedAxis:
-    """Return the load cycle that figures and drawings share; see `loaded`."""
-    return loaded(drive, circuit, share)
-
-
 def _bias_at_rest(circuit: str, share: float, drive: Drive) -> float:
-    return bias_at_rest(loaded_axis(drive, circuit, share))
+    return bias_at_rest(loaded(drive, circuit, share))
 
 
 class _FadeOutRatio(Measure):
@@ -88,7 +81,7 @@ class _FadeOutRatio(Measure):
         """Return the ratio of the loads over which the bias fades out."""
         widths = []
         for circuit in (OLD_CIRCUIT, NEW_CIRCUIT):
-            axis = loaded_axis(results.drives[circuit], circuit, _COMPARED_AT)
+            axis = loaded(results.drives[circuit], circuit, _COMPARED_AT)
             begin, end = fade_out(axis.drive, axis.bias)
             widths.append(end - begin)
         return widths[1] / widths[0]

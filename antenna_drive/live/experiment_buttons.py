@@ -13,16 +13,12 @@ from antenna_drive.article.experiments import DriveExperiment, experiments
 from antenna_drive.article.measures import article_measures, Measure
 from antenna_drive.article.published import Claim, CLAIMS
 from antenna_drive.emulator.run import Run
-from antenna_drive.emulator.unit import check_changes
-from antenna_drive.emulator.units import build
-from antenna_drive.emulator.wiring import DRIVE, UNITS
+from antenna_drive.emulator.units import build, SourceUnit
+from antenna_drive.emulator.wiring import DRIVE, TEST_SIGNAL, UNITS
 from antenna_drive.live.history import History, Piece
 from antenna_drive.parameters import load
-from antenna_drive.parameters.loading import check_waveform
-from antenna_drive.parameters.records import record_of
-from antenna_drive.parameters.sets import Drive, entries
-from antenna_drive.parameters.waveforms import Waveform
-from antenna_drive.physics import signal_generator
+from antenna_drive.parameters.sets import Drive
+from antenna_drive.parameters.waveforms import TestSignal
 import numpy as np
 from simgap.inputs.schema import Entry, Value
 
@@ -179,16 +175,11 @@ def preview(values: Mapping[str, Any], span_s: float, points: int = 600) -> dict
 
     Raises ParameterError: a value is not allowed.
     """
-    allowed = dict(entries(Waveform))
-    checked: dict[str, Any] = {**check_changes(values, allowed)}
-    waveform = Waveform(**checked)
-    check_waveform(waveform, 'preview')
+    unit = SourceUnit(TEST_SIGNAL, DRIVE.units[TEST_SIGNAL], TestSignal())
+    unit.tune(values)
     within = 8
-    time = np.linspace(0.0, span_s, points * within, endpoint=False)
-    bits = signal_generator.prbs_bits() if waveform.waveform == 'prbs' else np.ones(1)
-    value = np.empty(time.size)
-    signal_generator.values(time, record_of(waveform)[0], bits, value)
-    parts = value.reshape(points, within)
+    unit.start(span_s / (points * within))
+    parts = unit.ahead(-1, points * within)[:, 0, 0].reshape(points, within)
     return {'span': span_s, 'low': parts.min(axis=1).tolist(), 'high': parts.max(axis=1).tolist()}
 
 

@@ -4,32 +4,28 @@
 The drive as the page sees it: a ROS 2 node that nobody waits for.
 
 Frames are taken in bulk, twenty times a second, so that the drive is not slowed by a reader that
-wakes for each. Services and everything else are served in a second thread.
+wakes for each. Services and everything else are served in another thread.
 """
 
 from collections import deque
 from collections.abc import Mapping
-from functools import partial
 import json
 import os
 from threading import Event, Thread
 import time
 from typing import Any
 
-from antenna_drive.emulator.wiring import OUTPUTS, TEST_SIGNAL
+from antenna_drive.emulator.wiring import DRIVE, OUTPUTS, TEST_SIGNAL
 from antenna_drive.live.asking import ask
 from antenna_drive.live.board import Board
 from antenna_drive.live.history import History
 from antenna_drive.live.parameter_table import entry_of
 from antenna_drive.live.twins import Twins
-from antenna_drive.lockstep.changes import CHANGES, read_record, SETTINGS
+from antenna_drive.lockstep.changes import CHANGES, SETTINGS
 from antenna_drive.lockstep.entry import own_node
-from antenna_drive.lockstep.frame import FrameLayout
 from antenna_drive.lockstep.leaving import leave
-from antenna_drive.lockstep.readings import CHANGES_QOS
-from antenna_drive.lockstep.ros_link import FrameLink
-from antenna_drive.lockstep.run_services import StateReader
-from antenna_drive.lockstep.serving import Serving
+from antenna_drive.lockstep.observer import Observer
+from antenna_drive.lockstep.run_control import RunState
 from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.msg import Parameter as ParameterMessage, ParameterEvent, ParameterValue
 from rcl_interfaces.srv import (
@@ -37,7 +33,6 @@ from rcl_interfaces.srv import (
 )
 from rclpy.parameter import Parameter
 from simgap.errors import UserError
-from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 PERIOD_S = 0.05
@@ -64,11 +59,7 @@ class DriveLink:
         self._board = board
         self.namespace = '/' + namespace.strip('/') if namespace.strip('/') else ''
         self._node = own_node(f'live_{os.getpid()}', self.namespace)
-        self.history = History({unit: len(signals) for unit, signals in OUTPUTS.items()},
-                               TEST_SIGNAL)
-        self._frames = FrameLink(self._node, {
-            unit: FrameLayout(signals) for unit, signals in OUTPUTS.items()})
-        self._state = StateReader(self._node, TEST_SIGNAL)
+        self.history = History(len(DRIVE.signals))
         self.settings: dict[str, dict[str, Any]] = {unit: {} for unit in _UNITS}
         self._own: dict[str, dict[str, Any]] = {unit: {} for unit in _UNITS}
         self._changes: deque[dict[str, Any]] = deque(maxlen=_REMEMBERED)
@@ -86,31 +77,30 @@ class DriveLink:
             name: self._node.create_client(Trigger, f'{TEST_SIGNAL}/{name}')
             for name in ('pause', 'resume', 'step', 'reset', 'play')}
         self._stop = Event()
-        self._serving = Serving(self._node)
-        self._thread = Thread(target=self._poll, name='frames', daemon=True)
+        self._told: RunState | None = None
+        self._look_at = 0.0
+        self._observer = Observer(
+            self._node, lambda step, time_s, samples: self.history.take(step, samples[:, 0]),
+            on_begin=self.history.begin, on_change=self._changed, nap_s=PERIOD_S)
+        self._thread = Thread(target=self._observer.spin, args=[self._look], name='frames',
+                              daemon=True)
         self._thread.start()
 
     def close(self) -> None:
         """Leave the drive."""
         self._stop.set()
         self._thread.join()
-        self._serving.close()
+        self._observer.close()
         leave(self._node)
 
     # ---- what comes in
 
     def _listen(self) -> None:
         node = self._node
-        for unit in _UNITS:
-            node.create_subscription(String, f'{unit}/changes', partial(self._changed, unit),
-                                     CHANGES_QOS)
         node.create_subscription(DiagnosticArray, '/diagnostics', self._diagnosed, 50)
         node.create_subscription(ParameterEvent, '/parameter_events', self._parameters_set, 100)
 
-    def _changed(self, unit: str, message: String) -> None:
-        record = read_record(message.data)
-        if record is None:
-            return
+    def _changed(self, unit: str, record: Mapping[str, Any]) -> None:
         if SETTINGS in record:
             self.settings[unit] = {**record[SETTINGS]}
             self._board.post(f'values {unit}', {'unit': unit, 'values': record[SETTINGS]})
@@ -153,19 +143,21 @@ class DriveLink:
         return {unit: {**report, 'heard': now - report['heard']}
                 for unit, report in dict(self.reports).items()}
 
-    def _poll(self) -> None:
-        told = None
-        due = time.monotonic()
-        while not self._stop.wait(max(0.0, due - time.monotonic())):
-            due = max(due + PERIOD_S, time.monotonic())  # what is missed is not made up for
-            for unit in _UNITS:
-                frames = self._frames.take_all(unit)
-                if frames is not None:
-                    self.history.take(unit, frames)
-            state = self._state.latest()
-            if state != told and state is not None:
-                told = state
+    @property
+    def lost(self) -> int:
+        """Return how many steps were missed after the first that was seen."""
+        return self._observer.lost
+
+    def _look(self) -> bool:
+        """Post what the run does, if that is news; return whether to leave the drive."""
+        now = time.monotonic()
+        if now >= self._look_at:
+            self._look_at = now + PERIOD_S
+            state = self._observer.state
+            if state != self._told and state is not None:
+                self._told = state
                 self._board.post('state', state._asdict())
+        return self._stop.is_set()
 
     # ---- what is asked
 
@@ -184,7 +176,7 @@ class DriveLink:
                               DescribeParameters.Request(names=names), unit)
         got = await ask(self._clients[unit, 'get_parameters'],
                         GetParameters.Request(names=names), unit)
-        values = {name: _plain(value) for name, value in zip(names, got.values)}
+        values = dict(zip(names, map(_plain, got.values)))
         self.settings[unit].update(values)
         self._board.post(f'parameters {unit}', {
             'unit': unit, 'entries': [entry_of(item, values[item.name])

@@ -106,7 +106,7 @@ class Session:
                         break  # it may be starting: the next look asks again
             self.board.post('drive', {
                 'trouble': trouble, 'ready': ready and len(self._tables) == len(OUTPUTS),
-                'lost': self.link.history.lost})
+                'lost': self.link.lost})
             self.board.post('nodes', {'nodes': self.link.nodes()})
             await self._look_at_experiment()
             if was_recording and not self._recorder.running:

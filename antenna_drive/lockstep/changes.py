@@ -11,7 +11,6 @@ used. Nothing here needs ROS.
 
 from collections.abc import Mapping
 import json
-import math
 from typing import Any
 
 from antenna_drive.limits import CHANGE
@@ -45,7 +44,7 @@ def is_record(record: object) -> bool:
         return False
     values = record.get(SETTINGS, record.get(CHANGES))
     return (is_count(record.get('run')) and record['run'] > 0 and is_count(record.get('step'))
-            and isinstance(values, Mapping) and _is_plain(values, _DEEPEST))
+            and isinstance(values, Mapping) and _is_plain(values))
 
 
 def is_count(value: object) -> bool:
@@ -53,23 +52,18 @@ def is_count(value: object) -> bool:
     return isinstance(value, int) and not isinstance(value, bool) and 0 <= value < LARGEST_RUN
 
 
-def _is_plain(value: object, deepest: int) -> bool:
-    if isinstance(value, str):
-        return value.isascii() or _has_utf_8(value)
-    if value is None or isinstance(value, (bool, int)):
-        return True
-    if isinstance(value, float):
-        return math.isfinite(value)
-    if deepest and isinstance(value, Mapping):
-        return all(isinstance(key, str) and _is_plain(key, 0) and _is_plain(item, deepest - 1)
-                   for key, item in value.items())
-    return bool(deepest) and isinstance(value, (list, tuple)) and all(
-        _is_plain(item, deepest - 1) for item in value)
-
-
-def _has_utf_8(text: str) -> bool:
+def _is_plain(values: object) -> bool:
+    """Return whether these are finite numbers and texts that can be written, and not too deep."""
     try:
-        text.encode()
-    except UnicodeEncodeError:  # half of a surrogate pair, which JSON can spell
+        # a text may hold half of a surrogate pair, which JSON can spell
+        json.dumps(values, allow_nan=False, ensure_ascii=False).encode()
+    except (TypeError, ValueError, RecursionError):
         return False
-    return True
+    return _depth(values) <= _DEEPEST
+
+
+def _depth(value: object) -> int:
+    if not isinstance(value, (dict, list, tuple)):
+        return 0
+    items = value.values() if isinstance(value, dict) else value
+    return 1 + max(map(_depth, items), default=0)

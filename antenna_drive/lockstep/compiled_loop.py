@@ -3,8 +3,9 @@
 """
 The exchange of a member as one compiled loop: wait, take, check, step, pack, publish.
 
-It makes ordinary steps and nothing else. As soon as something else is due it returns to Python
-with the reason, and the Python side (`member`, `node`) deals with it as if there were no loop.
+It makes ordinary steps and nothing else: from frames of the peers that make every step, by senders
+that are known. As soon as something else is due it returns to Python with the reason, and the
+Python side (`member`, `node`) deals with it as if there were no loop.
 The loop knows C functions by their addresses only: rcl's in a node, any others in a test.
 
 What it works on is in arrays, so that the Python side reads where it stands. `Word`, `Time`,
@@ -15,7 +16,7 @@ from collections import namedtuple
 from typing import Any
 
 from antenna_drive.lockstep.delays import count
-from antenna_drive.lockstep.frame import HEADER, LATEST_BIRTH, SENDER
+from antenna_drive.lockstep.frame import HEADER, SENDER
 from antenna_drive.lockstep.inbox import DEPTH
 from antenna_drive.physics.block import rows
 from llvmlite import ir  # type: ignore[import-untyped]
@@ -34,7 +35,7 @@ _GO_ON = 0
 # Whole numbers. `asked` is set by other threads to end the loop; `every` is after how many steps
 # readings are published; `pause` is the step after which it returns; `peer` is who sent the frame
 # that the loop does not take in.
-Word = rows('asked', 'step', 'last_step', 'slack', 'every', 'pause', 'late', 'peer', 'status',
+Word = rows('asked', 'step', 'last_step', 'every', 'pause', 'late', 'peer', 'status',
             'publisher', 'guard', 'wait_set', 'incoming', 'outgoing', 'frame_in', 'frame_out',
             'frame_to', 'size_out', 'clock', 'brief_ns', 'value', 'stamp')
 
@@ -45,9 +46,8 @@ Time = rows('run', 'step_s', 'factor', 'start', 'first_step', 'lead', 'now', 'un
 Call = rows('take', 'publish', 'clear', 'add_subscription', 'add_guard', 'wait', 'copy',
             'compare', 'clock')
 
-# Of each peer: its subscription, the bytes in front of its numbers, how many numbers, and whether
-# it makes every step.
-Peer = rows('subscription', 'prefix', 'prefix_size', 'length', 'stepping')
+# Of each peer: its subscription, the bytes in front of its numbers, and how many numbers.
+Peer = rows('subscription', 'prefix', 'prefix_size', 'length')
 
 # Of each reading: the row of its value in the outputs, TIME for the simulated time; its publisher,
 # its message, and where the number is in the message.
@@ -67,8 +67,8 @@ _CLOCK_MONOTONIC = 1
 _LONGEST_WAIT_S = 0.1
 
 State = namedtuple('State', (
-    'words', 'times', 'calls', 'peers', 'order', 'frames', 'held', 'used', 'senders', 'sources',
-    'numbers', 'outgoing', 'clock', 'incoming', 'readings', 'scales', 'value', 'stamp', 'delays',
+    'words', 'times', 'calls', 'peers', 'order', 'frames', 'held', 'senders', 'sources', 'numbers',
+    'outgoing', 'clock', 'incoming', 'readings', 'scales', 'value', 'stamp', 'delays',
     'stamps', 'u', 'y'))
 
 
@@ -112,27 +112,14 @@ def _take(s: Any, peer: int) -> int:
     total = 0.0
     for n in range(length):
         total += s.numbers[n]
-    if s.numbers[0] != t[Time.run] or not np.isfinite(total):
-        return FOREIGN
-    sender = s.numbers[_SENDER]
-    if sender != s.senders[peer] and not np.isnan(s.senders[peer]):  # NaN: none is known yet
-        return FOREIGN
     step = w[Word.step]
-    if not s.peers[peer, Peer.stepping]:
-        # an observer says how far it is
-        used = s.numbers[1]
-        if used < 0.0 or used >= LATEST_BIRTH or used % 1.0 != 0.0:
-            return FOREIGN
-        s.used[peer] = max(s.used[peer], used)
-        s.senders[peer] = sender
-        return _GO_ON
     slot = step % DEPTH
-    if s.numbers[1] != step or s.held[peer, slot]:
+    if (s.numbers[0] != t[Time.run] or s.numbers[1] != step or not np.isfinite(total)
+            or s.numbers[_SENDER] != s.senders[peer] or s.held[peer, slot]):
         return FOREIGN
     for n in range(length):
         s.frames[peer, slot, n] = s.numbers[n]
     s.held[peer, slot] = 1
-    s.senders[peer] = sender
     return _GO_ON
 
 
@@ -144,15 +131,6 @@ def _wait_for(s: Any, peer: int) -> None:
     call_c(calls[Call.add_subscription], (
         w[Word.wait_set], s.peers[peer, Peer.subscription], np.int64(0)))
     call_c(calls[Call.wait], (w[Word.wait_set], w[Word.brief_ns]))
-
-
-@inner
-def _take_or_wait(s: Any, peer: int) -> int:
-    reason = _take(s, peer)
-    if reason == MISSING:
-        _wait_for(s, peer)
-        reason = _take(s, peer)
-    return reason
 
 
 @shared
@@ -174,12 +152,6 @@ def gather(s: Any) -> int:
             s.order[0] = peer
         if reason != _GO_ON:
             return reason
-    for peer in range(s.peers.shape[0]):
-        while (not s.peers[peer, Peer.stepping]
-               and s.used[peer] < max(0, w[Word.step] - w[Word.slack])):
-            reason = _take_or_wait(s, peer)
-            if reason != _GO_ON:
-                return reason
     return _GO_ON
 
 
@@ -245,8 +217,7 @@ def put_out(s: Any) -> int:
     """Go on to the next step: check what the unit has put out, publish it."""
     w, t = s.words, s.times
     slot = w[Word.step] % DEPTH
-    for place in range(s.order.size):
-        s.held[s.order[place], slot] = 0
+    s.held[:, slot] = 0
     w[Word.step] += 1
     step = w[Word.step]
     outputs = s.y.shape[0]

@@ -17,6 +17,9 @@ SLACK = MEMORY // 2
 # it could not keep what it gets of a run that it has yet to begin.
 _NOT_BEGUN = -1.0
 
+# A last step that no run comes to.
+NEVER = 2**62
+
 
 class Conductor(Member):
     """
@@ -135,6 +138,12 @@ class Conductor(Member):
         if self.last_step is not None and self.step > self.last_step:
             least = self.step
         return tuple(name for name, used in self.used.items() if used < least)
+
+    def farthest(self) -> int:
+        """Return the last step that can be made before an observer, or the run's end, is due."""
+        ends = [*(used + SLACK + 1 if used >= 0.0 else 0.0 for used in self.used.values()),
+                *([] if self.last_step is None else [self.last_step])]
+        return int(min(ends, default=NEVER))
 
     def steady(self) -> bool:
         """Return whether nothing is due but the next steps of the run in progress."""

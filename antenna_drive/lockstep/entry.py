@@ -202,8 +202,6 @@ def ros_node(name: str, arguments: Sequence[str], example: str) -> Iterator[Node
     """
     Give this process its node, and take it out of the graph in the end.
 
-    Signals are left to the process.
-
     name : of the node unless it is remapped
     arguments : command line without the program's name
     example : a right ROS 2 parameter, for the error
@@ -211,51 +209,39 @@ def ros_node(name: str, arguments: Sequence[str], example: str) -> Iterator[Node
     Raises UserError: the command line has an argument that is none of ROS 2's, or a wrong one.
     """
     from antenna_drive.lockstep.leaving import leave
-    import rclpy
     from rclpy.exceptions import InvalidParameterTypeException
-    from rclpy.node import Node
-    choose_transport(os.environ)
-    _init_ros(name, arguments, example)
-    try:
-        try:
-            # what nobody has declared reaches `Overrides`, which says what was meant
-            node = Node(name, allow_undeclared_parameters=True)
-        except (RuntimeError, InvalidParameterTypeException) as error:
-            raise UserError(_first_line(error)) from error
-        try:
-            yield node
-        finally:
-            leave(node)
-    finally:
-        rclpy.try_shutdown()
-
-
-def own_node(name: str, namespace: str = '') -> 'Node':
-    """Return a node in a context of its own; `leave` takes both out of the graph."""
-    from rclpy.context import Context
-    from rclpy.node import Node
-    choose_transport(os.environ)
-    context = Context()
-    context.init(args=[])
-    try:
-        return Node(name, namespace=namespace, context=context)
-    except BaseException:
-        context.try_shutdown()
-        raise
-
-
-def _init_ros(name: str, arguments: Sequence[str], example: str) -> None:
-    import rclpy
-    from rclpy.signals import SignalHandlerOptions
     from rclpy.utilities import remove_ros_args
     try:
         left = remove_ros_args([name, *arguments])[1:]
         if left:
             raise UserError(f'{left[0]}: no such option; ROS 2 arguments follow --ros-args, '
                             f'as in --ros-args -p {example}')
-        rclpy.init(args=[name, *arguments], signal_handler_options=SignalHandlerOptions.NO)
-    except RuntimeError as error:
+        node = own_node(name, arguments=arguments)
+    except (RuntimeError, InvalidParameterTypeException) as error:
         raise UserError(_first_line(error)) from error
+    try:
+        yield node
+    finally:
+        leave(node)
+
+
+def own_node(name: str, namespace: str = '', arguments: Sequence[str] = ()) -> 'Node':
+    """
+    Return a node in a context of its own; `leave` takes both out of the graph.
+
+    Signals are left to the process.
+    """
+    from rclpy.context import Context
+    from rclpy.node import Node
+    choose_transport(os.environ)
+    context = Context()
+    context.init(args=[name, *arguments])
+    try:
+        # what nobody has declared reaches `Overrides`, which says what was meant
+        return Node(name, namespace=namespace, context=context, allow_undeclared_parameters=True)
+    except BaseException:
+        context.try_shutdown()
+        raise
 
 
 def stopped_by_signals() -> Event:

@@ -19,7 +19,7 @@ from antenna_drive.emulator.unit import FloatArray, Unit
 from antenna_drive.lockstep import compiled_loop as loop
 from antenna_drive.lockstep.compiled_loop import Call, Peer, Reading, Time, Word
 from antenna_drive.lockstep.compiled_unit import CompiledForm, form_of
-from antenna_drive.lockstep.conductor import Conductor, SLACK
+from antenna_drive.lockstep.conductor import Conductor, NEVER
 from antenna_drive.lockstep.delays import empty_counts
 from antenna_drive.lockstep.frame import CDR_LITTLE_ENDIAN, HEADER, SENDER
 from antenna_drive.lockstep.inbox import DEPTH, Frame
@@ -31,9 +31,6 @@ import numpy as np
 
 # After this the loop returns, so that Python can answer signals [s].
 LIMIT_S = 0.1
-
-# A last step that no run comes to.
-_NEVER = 2**62
 
 _LOOP = """
 # {unit}
@@ -103,18 +100,18 @@ def compile_ahead(unit: Unit) -> None:
     """
     form = form_of(unit)
     if form is not None:
-        state = _state(0, 0, 1, 1, 0, len(unit.inputs), form.outputs, 0)
+        state = _state(0, 1, 1, 0, len(unit.inputs), form.outputs, 0)
         # it returns at once: step 0 is the last
         _loop_of(form)(state, form.memory(1e-3))
 
 
-def _state(peers: int, stepping: int, longest: int, length: int, readings: int, inputs: int,
+def _state(peers: int, longest: int, length: int, readings: int, inputs: int,
            outputs: FloatArray, stamps: int) -> Any:
     return loop.State(
         words=np.zeros(len(Word), np.int64), times=np.zeros(len(Time)),
         calls=np.zeros(len(Call), np.int64), peers=np.zeros((peers, len(Peer)), np.int64),
-        order=np.arange(stepping), frames=np.zeros((peers + 1, DEPTH, longest)),
-        held=np.zeros((peers, DEPTH), np.int64), used=np.zeros(peers), senders=np.zeros(peers),
+        order=np.arange(peers), frames=np.zeros((peers + 1, DEPTH, longest)),
+        held=np.zeros((peers, DEPTH), np.int64), senders=np.zeros(peers),
         sources=np.zeros((inputs, 2), np.int64), numbers=np.zeros(longest),
         outgoing=np.zeros(length), clock=np.zeros(2, np.int64),
         incoming=np.zeros(loop.MESSAGE_WORDS, np.int64),
@@ -145,23 +142,21 @@ class Exchange:
         self._form = form
         self._channel = channel
         self._loop = _loop_of(form)
-        self._peers = tuple(member.inbox.slots)
-        self._rows = {peer: row for row, peer in enumerate(self._peers)}
+        # the slowest first
+        self._peers = member.inbox.stepping
         self.steps = 0
         self.running = False
         self.pauses: list[int] = []
         lengths = [member.layouts[peer].length for peer in self._peers]
-        stepping = member.inbox.stepping
         own = member.layout
-        self._s = s = _state(len(self._peers), len(stepping), max([own.length, *lengths]),
+        self._s = s = _state(len(self._peers), max([own.length, *lengths]),
                              own.length, len(channel.readings), len(member.sources),
                              form.outputs, stamps)._replace(
                                  incoming=channel.incoming)
         s.outgoing[SENDER] = member.sender
-        s.order[:] = [self._rows[peer] for peer in stepping]
-        s.sources[:] = np.array(
-            [(self._rows.get(peer, len(self._peers)), column) for peer, column in member.sources],
-            np.int64).reshape(-1, 2)
+        rows = {peer: row for row, peer in enumerate((*self._peers, member.unit.name))}
+        s.sources[:] = np.array([(rows[peer], column) for peer, column in member.sources],
+                                np.int64).reshape(-1, 2)
         s.calls[:] = [channel.calls[name] for name in Call._fields]
         self._lengths = lengths
         # what the addresses in `peers` and in the outgoing message point to
@@ -171,12 +166,12 @@ class Exchange:
                                   np.uint8)
         for row, (peer, prefix) in enumerate(zip(self._peers, self._prefixes)):
             s.peers[row] = (channel.subscriptions[peer], prefix.ctypes.data, prefix.size,
-                            lengths[row], peer in stepping)
+                            lengths[row])
         self._message = np.array(
             [self._out.ctypes.data, self._out.size, self._out.size, *channel.allocator], np.int64)
         self._prepare_readings()
         for name, value in {
-                'slack': SLACK, 'publisher': channel.publisher, 'guard': channel.guard,
+                'publisher': channel.publisher, 'guard': channel.guard,
                 'wait_set': channel.wait_set, 'incoming': channel.incoming.ctypes.data,
                 'outgoing': self._message.ctypes.data, 'frame_in': s.numbers.ctypes.data,
                 'frame_out': s.outgoing.ctypes.data,
@@ -252,7 +247,7 @@ class Exchange:
         w[Word.every] = every
         w[Word.pause] = next((step for step in self.pauses if step > member.step), 0)
         w[Word.late] = 0
-        w[Word.last_step] = _NEVER
+        w[Word.last_step] = member.farthest() if isinstance(member, Conductor) else NEVER
         t[Time.run] = member.run
         t[Time.step_s] = member.step_s
         t[Time.until] = time.monotonic() + limit_s
@@ -262,11 +257,6 @@ class Exchange:
             t[Time.factor] = pace.factor
             t[Time.start], t[Time.first_step] = pace.timetable
             t[Time.lead] = pace.lead_s
-        if isinstance(member, Conductor):
-            if member.last_step is not None:
-                w[Word.last_step] = member.last_step
-            for peer, used in member.used.items():
-                s.used[self._rows[peer]] = used
         for row, (peer, length) in enumerate(zip(self._peers, self._lengths)):
             s.senders[row] = inbox.senders.get(peer, np.nan)
             for slot, frame in enumerate(inbox.slots[peer]):
@@ -288,11 +278,6 @@ class Exchange:
             inbox.slots[peer][:] = [
                 tuple(frames[slot, :length].tolist()) if held[slot] else None
                 for slot in range(DEPTH)]
-        inbox.senders.update((peer, sender) for peer, sender in zip(
-            self._peers, s.senders.tolist()) if not np.isnan(sender))
-        if isinstance(member, Conductor):
-            for peer in member.used:
-                member.used[peer] = float(s.used[self._rows[peer]])
         if step != member.step:
             self._form.reached(step)
             member.follow(step, self._form.outputs)

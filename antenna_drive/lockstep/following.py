@@ -10,11 +10,11 @@ a frame that somebody invents begins no run. Nothing here needs ROS.
 """
 
 from collections import deque
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
-from antenna_drive.lockstep.frame import all_finite, HEADER, LARGEST_RUN, NO_RUN, SENDER
-from antenna_drive.lockstep.inbox import Frame
+from antenna_drive.lockstep.frame import HEADER, NO_RUN, SENDER
+from antenna_drive.lockstep.inbox import fault_of, Frame
 
 # Units are a few steps apart at most; more incomplete steps than this are not genuine.
 _DEPTH = 4096
@@ -118,15 +118,12 @@ class Follower:
         """Expect no more frames: memories need not wait for newer ones."""
         self._over = True
 
-    def receive(self, unit: str, frame: Sequence[float]) -> None:
+    def receive(self, unit: str, frame: Frame) -> None:
         """Take in a frame of a unit."""
-        if len(frame) != self.lengths[unit] or not all_finite(frame):
+        if fault_of(frame, self.lengths[unit]) is not None:
             self.refused += 1
             return
         if frame[0] == NO_RUN or frame[0] in self._past:
-            return
-        if not (_is_count(frame[0]) and _is_count(frame[1])):
-            self.refused += 1
             return
         if unit == self._conductor:
             self._announced = frame[0]
@@ -134,7 +131,7 @@ class Follower:
             if len(self._runs) >= _MOST_RUNS:
                 del self._runs[next(known for known in self._runs if known != self.run)]
             self._runs[frame[0]] = _Run()
-        self._file(unit, tuple(frame), self._runs[frame[0]])
+        self._file(unit, frame, self._runs[frame[0]])
 
     def _file(self, unit: str, frame: Frame, run: _Run) -> None:
         number, sender = int(frame[1]), run.senders.setdefault(unit, frame[SENDER])
@@ -202,7 +199,3 @@ class Follower:
                              for number, frames in over.steps.items())
             following.next = 0
         self.run = int(self._announced)
-
-
-def _is_count(number: float) -> bool:
-    return 0.0 <= number < LARGEST_RUN and number % 1.0 == 0.0

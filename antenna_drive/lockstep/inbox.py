@@ -38,6 +38,19 @@ class Refusal(str, Enum):
     SECOND_SENDER = 'second sender'
 
 
+def fault_of(frame: Frame, length: int) -> Refusal | None:
+    """Return what is wrong with a frame in any run, if it should have so many numbers."""
+    if len(frame) != length:
+        return Refusal.WRONG_LENGTH
+    if not all_finite(frame):
+        return Refusal.NAN if any(map(math.isnan, frame)) else Refusal.INFINITE
+    if not 0.0 <= frame[1] < LATEST_BIRTH or frame[1] % 1.0 != 0.0:
+        return Refusal.NOT_A_STEP
+    if not 0.0 <= frame[0] < LARGEST_RUN or frame[0] % 1.0 != 0.0:
+        return Refusal.WRONG_RUN
+    return None
+
+
 class Inbox:
     """
     The frames of the run in progress, by peer and step.
@@ -97,18 +110,10 @@ class Inbox:
 
     def well_formed(self, peer: str, frame: Frame) -> bool:
         """Check everything about a frame that needs no knowledge of the run; count a refusal."""
-        if len(frame) != self._lengths[peer]:
-            self.refuse(peer, Refusal.WRONG_LENGTH)
-        elif not all_finite(frame):
-            nan = any(map(math.isnan, frame))
-            self.refuse(peer, Refusal.NAN if nan else Refusal.INFINITE)
-        elif not 0.0 <= frame[1] < LATEST_BIRTH or frame[1] % 1.0 != 0.0:
-            self.refuse(peer, Refusal.NOT_A_STEP)
-        elif not 0.0 <= frame[0] < LARGEST_RUN or frame[0] % 1.0 != 0.0:
-            self.refuse(peer, Refusal.WRONG_RUN)
-        else:
-            return True
-        return False
+        fault = fault_of(frame, self._lengths[peer])
+        if fault is not None:
+            self.refuse(peer, fault)
+        return fault is None
 
     def offer(self, peer: str, frame: Frame) -> None:
         """Take in a well-formed frame, or refuse it and count why."""

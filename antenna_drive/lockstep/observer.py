@@ -22,7 +22,7 @@ from antenna_drive.lockstep.frame import FrameLayout, new_sender
 from antenna_drive.lockstep.leaving import leave
 from antenna_drive.lockstep.readings import CHANGES_QOS
 from antenna_drive.lockstep.ros_link import FrameLink
-from antenna_drive.lockstep.run_control import PAUSED
+from antenna_drive.lockstep.run_control import PAUSED, RunState
 from antenna_drive.lockstep.run_services import StateReader
 from antenna_drive.lockstep.serving import Serving
 import numpy as np
@@ -36,7 +36,7 @@ OnChange = Callable[[str, Mapping[str, Any]], None]
 _LONGEST_WAIT_S = 0.1
 
 # To be woken for each frame would cost the drive more than to be read in bulk [s].
-_NAP_S = 0.01
+NAP_S = 0.01
 
 
 class Observer(Follower):
@@ -51,7 +51,7 @@ class Observer(Follower):
     """
 
     def __init__(self, node: str | Node, on_step: OnStep, *, on_begin: OnBegin | None = None,
-                 on_change: OnChange | None = None, namespace: str = '',
+                 on_change: OnChange | None = None, namespace: str = '', nap_s: float = NAP_S,
                  outputs: Mapping[str, Sequence[Signal]] = OUTPUTS) -> None:
         """
         Join a drive.
@@ -66,13 +66,14 @@ class Observer(Follower):
         on_change : called as on_change(unit, record) with what a node says on `<unit>/changes`,
             see `changes`; from another thread
         namespace : where the drive is, for a node of the observer's own
+        nap_s : how long to let frames come before they are read [s]
         outputs : the signals of each unit
         """
         layouts = {unit: FrameLayout(signals) for unit, signals in outputs.items()}
         super().__init__({unit: layout.length for unit, layout in layouts.items()}, TEST_SIGNAL)
         self.names = tuple(
             f'{unit}/{signal.name}' for unit, signals in outputs.items() for signal in signals)
-        self._on_step, self._on_begin = on_step, on_begin
+        self._on_step, self._on_begin, self._nap_s = on_step, on_begin, nap_s
         self._owns_node = isinstance(node, str)
         self.node = own_node(node, namespace) if isinstance(node, str) else node
         self._link = FrameLink(self.node, layouts)
@@ -100,9 +101,14 @@ class Observer(Follower):
         self._serving = Serving(self.node)
 
     @property
+    def state(self) -> RunState | None:
+        """Return what the drive said last of its run; for the thread that spins."""
+        return self._state.latest()
+
+    @property
     def paused(self) -> bool:
         """Return whether an operator holds the drive; for the thread that spins."""
-        state = self._state.latest()
+        state = self.state
         return state is not None and state.state == PAUSED and state.run == self.run
 
     def spin(self, until: Callable[[], bool]) -> None:
@@ -117,7 +123,7 @@ class Observer(Follower):
             self._tell()
             if not came:
                 self.idle = not self._link.wait(tuple(self.lengths), _LONGEST_WAIT_S)
-            time.sleep(_NAP_S)
+            time.sleep(self._nap_s)
 
     def finish(self) -> None:
         """Hand on all that has come; nothing more is waited for."""

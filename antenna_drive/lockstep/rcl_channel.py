@@ -72,9 +72,9 @@ class RclChannel:
         self._initialise = _function(
             rcutils, 'rcutils_uint8_array_init', ctypes.c_void_p, ctypes.c_size_t, ctypes.c_void_p)
         self._finish = _function(rcutils, 'rcutils_uint8_array_fini', ctypes.c_void_p)
-        _address(rcutils, 'rcutils_get_default_allocator')
-        rcutils.rcutils_get_default_allocator.restype = _Allocator
-        self._allocator = rcutils.rcutils_get_default_allocator()
+        default_allocator = _function(rcutils, 'rcutils_get_default_allocator')
+        default_allocator.restype = _Allocator
+        self._allocator = default_allocator()
         self.allocator: Sequence[int] = [
             getattr(self._allocator, name) or 0 for name in _ALLOCATOR]
         self.incoming = np.zeros(MESSAGE_WORDS, np.int64)
@@ -184,17 +184,14 @@ def _loaded(name: str) -> ctypes.CDLL:
 
 
 def _function(library: ctypes.CDLL, symbol: str, *arguments: type) -> Any:
-    _address(library, symbol)
-    function = library[symbol]
+    try:
+        function = library[symbol]
+    except AttributeError as error:
+        raise Unusable(f'{symbol} is not there') from error
     function.argtypes = arguments
     function.restype = ctypes.c_int
     return function
 
 
 def _address(library: ctypes.CDLL, symbol: str) -> int:
-    try:
-        address = ctypes.cast(library[symbol], ctypes.c_void_p).value
-    except AttributeError as error:
-        raise Unusable(f'{symbol} is not there') from error
-    assert address is not None
-    return address
+    return ctypes.cast(_function(library, symbol), ctypes.c_void_p).value or 0

@@ -14,9 +14,7 @@ from typing import Any
 
 from antenna_drive.lockstep.frame import FrameLayout, read_foreign
 from antenna_drive.lockstep.member import BRIEF_WAIT_S, Member, MEMORY
-from antenna_drive.physics.arrays import FloatArray
-import numpy as np
-from rclpy.callback_groups import CallbackGroup
+from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.duration import Duration
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.node import Node
@@ -38,17 +36,11 @@ FRAME_QOS = remembered(MEMORY)
 READ_QOS = remembered(2 * MEMORY)
 
 
-class NotForExecutors(CallbackGroup):  # type: ignore[misc]
+class NotForExecutors(ReentrantCallbackGroup):  # type: ignore[misc]
     """The group of the subscriptions that no executor may serve."""
 
     def can_execute(self, entity: Any) -> bool:
         return False
-
-    def beginning_execution(self, entity: Any) -> bool:
-        return False
-
-    def ending_execution(self, entity: Any) -> None:
-        pass
 
 
 def unserved(node: Node, kind: Any, topic: str, qos: QoSProfile, raw: bool = False) -> Any:
@@ -89,24 +81,6 @@ class FrameLink:
         message: bytes = taken[0]
         frame = self._layouts[peer].decode(message)
         return read_foreign(message) if frame is None else frame
-
-    def take_all(self, peer: str) -> FloatArray | None:
-        """
-        Take all frames of a peer that have not been taken, for a reader that nobody waits for.
-
-        Returns them in shape (frames, numbers of the peer's layout), oldest first, without
-        messages of any other layout; None if there is none.
-        """
-        layout, handle = self._layouts[peer], self._handles[peer]
-        prefix, size = layout.prefix, len(layout.prefix) + 8 * layout.length
-        numbers = []
-        while (taken := handle.take_message(Float64MultiArray, True)) is not None:
-            message: bytes = taken[0]
-            if len(message) == size and message.startswith(prefix):
-                numbers.append(message[len(prefix):])
-        if not numbers:
-            return None
-        return np.frombuffer(b''.join(numbers), '<f8').reshape(-1, layout.length)
 
     def wait_for(self, peer: str, timeout_s: float) -> None:
         """Sleep until a frame of this peer is there or time is up."""
@@ -182,6 +156,8 @@ class Reception:
                     # While the slowest is waited for, the frames of the others come.
                     member.inbox.put_first(peer)
             member.receive(peer, frame)
+            if peer not in member.inbox.stepping:
+                self.take_some(peer)
         return bool(missing) or not self._paced
 
     def take_some(self, peer: str) -> None:

@@ -65,9 +65,9 @@ class RunControl:
     reset_wanted : whether a new run was asked for
     """
 
-    def __init__(self, patience_s: float) -> None:
-        """Let requests wait for the lock-step thread for this long [s]."""
-        self._patience_s = patience_s
+    def __init__(self, patience_s: float, wake: Callable[[], None]) -> None:
+        """Let requests wait for so long [s] for the lock-step thread, which `wake` lets look."""
+        self._patience_s, self._wake = patience_s, wake
         self._changed = Condition()
         self.paused = False
         self._until = 0
@@ -104,18 +104,14 @@ class RunControl:
             self._begun += 1
             self._changed.notify_all()
 
-    def pause(self, wake: Callable[[], None]) -> str:
-        """
-        Make no more steps; return when the drive stands still.
-
-        wake : makes the lock-step thread look
-        """
+    def pause(self) -> str:
+        """Make no more steps; return when the drive stands still."""
         with self._changed:
             if not self.paused:
                 self.paused = True
                 self._standing = None
             self._until = 0
-            return self._wait(wake, lambda: self._standing is not None, 'come to its next step')
+            return self._wait(lambda: self._standing is not None, 'come to its next step')
 
     def resume(self) -> str:
         """Go on with the run."""
@@ -124,33 +120,33 @@ class RunControl:
                 return 'the drive is not paused'
             self.paused = False
             self._standing = None
+            self._wake()
         return ''
 
-    def step(self, count: int, wake: Callable[[], None], patience_s: float) -> str:
+    def step(self, count: int, patience_s: float) -> str:
         """
-        Make some steps of a paused run; return when they are made or after `patience_s` [s].
+        Make so many steps of a paused run; return when they are made.
 
-        count : how many
-        wake, patience_s : see `pause`; after that time the steps go on to be made
+        It returns after `patience_s` [s] at the latest, and the steps go on to be made.
         """
         with self._changed:
             if not self.paused or self._standing is None:
                 return 'steps can be made in a paused run only: call pause first'
             self._until = self._standing + count
             self._standing = None
-            wake()
+            self._wake()
             self._changed.wait_for(lambda: self._standing is not None, patience_s)
         return ''
 
-    def reset(self, wake: Callable[[], None]) -> str:
+    def reset(self) -> str:
         """Begin a new run; return when it has begun. A paused drive stays paused."""
         with self._changed:
             before = self._begun
             self.reset_wanted = True
-            return self._wait(wake, lambda: self._begun > before, 'heard from all its nodes')
+            return self._wait(lambda: self._begun > before, 'heard from all its nodes')
 
-    def _wait(self, wake: Callable[[], None], done: Callable[[], bool], what: str) -> str:
-        wake()
+    def _wait(self, done: Callable[[], bool], what: str) -> str:
+        self._wake()
         if self._changed.wait_for(done, self._patience_s):
             return ''
         return f'the drive has not {what} for {self._patience_s:g} s; it will when it can'

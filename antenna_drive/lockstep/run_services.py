@@ -53,15 +53,15 @@ class RunServices:
         read_sheet : returns the settings that play the test sheet in a file; None for a conductor
             that plays none
         """
-        self.control = RunControl(PATIENCE_S)
+        self.control = RunControl(PATIENCE_S, wake)
         self._node, self._conductor, self._pace = node, conductor, pace
-        self._wake, self._reached, self._hurry = wake, reached, hurry
+        self._reached, self._hurry = reached, hurry
         self._told = ('', 0)
         self._topic = node.create_publisher(String, f'{node.get_name()}/{TOPIC}', STATE_QOS)
-        self._offer('pause', lambda: self.control.pause(wake))
+        self._offer('pause', self.control.pause)
         self._offer('resume', self._resume)
         self._offer('step', self._step)
-        self._offer('reset', lambda: self.control.reset(wake))
+        self._offer('reset', self.control.reset)
         self._offer('state', lambda: '')
         if read_sheet is not None:
             self._offer('play', lambda: self._play(read_sheet))
@@ -82,14 +82,12 @@ class RunServices:
 
     def _resume(self) -> str:
         self._restart_clock()
-        reason = self.control.resume()
-        self._wake()
-        return reason
+        return self.control.resume()
 
     def _step(self) -> str:
         self._restart_clock()
         steps = int(self._node.get_parameter('run.steps').value or 1)
-        return self.control.step(steps, self._wake, STEP_PATIENCE_S)
+        return self.control.step(steps, STEP_PATIENCE_S)
 
     def _play(self, read_sheet: ReadSheet) -> str:
         """Begin a run with the waveform of the test sheet that the parameters name."""
@@ -103,7 +101,7 @@ class RunServices:
         result = self._node.set_parameters_atomically([
             Parameter(name, value=list(value) if isinstance(value, tuple) else value)
             for name, value in settings.items()])
-        reason = ('' if result.successful else result.reason) or self.control.reset(self._wake)
+        reason = ('' if result.successful else result.reason) or self.control.reset()
         return self._resume() if not reason and self.control.paused else reason
 
     def state(self) -> RunState:

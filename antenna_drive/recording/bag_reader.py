@@ -134,16 +134,11 @@ def _check_counts(storage: Storage, counts: dict[str, int] | None) -> None:
         return
     if not counts:
         raise DamageError(f'there is no {METADATA}')
-    for topic, parts in storage.samples.items():
-        found = sum(len(part) for part in parts)
-        if counts.get(topic) != found:
-            raise DamageError(f'{found} messages of {one_line(topic)}, but {METADATA} tells of '
-                              f'{counts.get(topic, 0)}')
-    missing = set(counts) - set(storage.samples) - storage.skipped
-    for topic in sorted(missing):
-        if counts[topic]:
-            raise DamageError(f'no message of {one_line(topic)}, but {METADATA} tells of '
-                              f'{counts[topic]}')
+    found = {topic: sum(map(len, parts)) for topic, parts in storage.samples.items()}
+    for topic in sorted({*found, *counts} - storage.skipped):
+        if found.get(topic, 0) != counts.get(topic, 0):
+            raise DamageError(f'{found.get(topic) or "no"} messages of {one_line(topic)}, but '
+                              f'{METADATA} tells of {counts.get(topic, 0)}')
 
 
 def _recording(storage: Storage) -> Recording:

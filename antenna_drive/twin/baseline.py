@@ -43,6 +43,8 @@ _STANDS = 0.3
 # The encoder counts on with every error of a rate: it is compared behind a high-pass of this
 # time [s].
 WASH_OUT_S = 3.0
+# Between the samples of a recorder of whose spacing nothing is known [s].
+_USUAL_S = 0.01
 ENCODER, _RATE = AT['encoder'], AT['tach_1']
 # Columns of the regressors: the first slope, and the direction.
 SLOPES, WAY = 1 + len(READINGS), 1 + 2 * len(READINGS)
@@ -135,9 +137,9 @@ def residual_of(column: int, values: FloatArray, twin: FloatArray, times: FloatA
                 wash_out: WashOut) -> FloatArray:
     """Return measured minus twin; that of the encoder behind its high-pass."""
     residual = values - twin
-    if column == ENCODER and times.size > 1:
-        return wash_out(residual, float(np.median(np.diff(times))))
-    return residual
+    if column != ENCODER:
+        return residual
+    return wash_out(residual, float(np.median(np.diff(times))) if times.size > 1 else _USUAL_S)
 
 
 def interpolated(times: FloatArray, grid: FloatArray, table: FloatArray) -> FloatArray:

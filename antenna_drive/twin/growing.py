@@ -53,7 +53,49 @@ def look_of(result: Mapping[str, Any], lengths_s: Collection[float]) -> Look:
                 tuple(map(frozenset, result['confusable'])))
 
 
-class GrowingVerdict:
+class Task:
+    """
+    What a process is asked for, one thing at a time, after what it has to do already.
+
+    fault : why the last one has failed; '' if it has not
+    """
+
+    def __init__(self, executor: Executor, drive: Drive,
+                 function: Callable[[Any, Drive], dict[str, Any]]) -> None:
+        """Ask for a function of a module, of something and the configuration."""
+        self._executor, self._drive, self._function = executor, drive, function
+        self._running: Future[dict[str, Any]] | None = None
+        self._found: dict[str, Any] = {}
+        self.fault = ''
+
+    @property
+    def under_way(self) -> bool:
+        """Return whether something is being done."""
+        return self._running is not None
+
+    def _ask(self, given: object) -> None:
+        self._running = self._executor.submit(self._function, given, self._drive)
+
+    def take(self) -> bool:
+        """
+        Take what was found; return whether a task has ended.
+
+        Raises BrokenExecutor: its process was ended.
+        """
+        if self._running is None or not self._running.done():
+            return False
+        future, self._running = self._running, None
+        self._found, self.fault = {}, ''
+        try:
+            self._found = future.result()
+        except BrokenExecutor:
+            raise
+        except Exception as error:  # noqa: B902 (a fault of the task must not end the twin)
+            self.fault = one_line(error, _LONGEST_FAULT)
+        return True
+
+
+class GrowingVerdict(Task):
     """
     Looks at the tests of one machine while they are made.
 
@@ -63,20 +105,17 @@ class GrowingVerdict:
 
     looks : what they said, in the order of time
     planning : what the design of a further test takes from the last one, {} before it
-    fault : why the last look has failed; '' if it has not
     """
 
     def __init__(self, executor: Executor, drive: Drive,
                  diagnose: Callable[[Mapping[str, Recording], Drive], dict[str, Any]] = diagnosed,
                  ) -> None:
-        self._executor, self._drive, self._diagnose = executor, drive, diagnose
+        super().__init__(executor, drive, diagnose)
         self.rule = Rule()
         self._tests: dict[str, Recording] = {}
-        self._running: tuple[Future[dict[str, Any]], list[float]] | None = None
-        self._looked_at_s = 0.0
+        self._lengths_s: list[float] = []  # of the tests that are looked at
         self.looks: list[Look] = []
         self.planning: Mapping[str, Any] = {}
-        self.fault = ''
 
     @property
     def decided(self) -> bool:
@@ -90,33 +129,24 @@ class GrowingVerdict:
 
     def due(self, seconds: float) -> bool:
         """Return whether a look could begin with so much of the present test [s]."""
-        if self._running is not None or self.decided:
+        if self.under_way or self.decided:
             return False
         total = seconds + sum(map(_length, self._tests.values()))
-        return total >= max(FIRST_S, GROWTH * self._looked_at_s)
+        return total >= max(FIRST_S, GROWTH * sum(self._lengths_s))
 
     def begin(self, test: Recording) -> None:
         """Look at the present test and those before it."""
         tests = {**self._tests, f'test {len(self._tests) + 1}': test}
-        lengths_s = [_length(item) for item in tests.values()]
-        self._looked_at_s = sum(lengths_s)
-        self._running = self._executor.submit(self._diagnose, tests, self._drive), lengths_s
+        self._lengths_s = [_length(item) for item in tests.values()]
+        self._ask(tests)
 
     def take(self) -> bool:
-        """
-        Take the result of a look that has ended; return whether one has.
-
-        Raises BrokenExecutor: its process was ended.
-        """
-        if self._running is None or not self._running[0].done():
-            return False
-        future, lengths_s = self._running
-        self._running = None
-        result, self.fault = outcome(future)
-        if result is not None:
-            self.looks.append(look_of(result, lengths_s))
-            self.planning = result['planning']
-        return True
+        """Take the result of a look that has ended; see `Task.take`."""
+        ended = super().take()
+        if ended and not self.fault:
+            self.looks.append(look_of(self._found, self._lengths_s))
+            self.planning = self._found['planning']
+        return ended
 
     @property
     def named(self) -> str:
@@ -160,16 +190,6 @@ def _length(test: Recording) -> float:
     return float(time[-1] - time[0]) / 1e9
 
 
-def outcome(future: Future[dict[str, Any]]) -> tuple[dict[str, Any] | None, str]:
-    """Return what a task has found, or None and why it failed; BrokenExecutor if it was ended."""
-    try:
-        return future.result(), ''
-    except BrokenExecutor:
-        raise
-    except Exception as error:  # noqa: B902 (a fault of the task must not end the twin)
-        return None, one_line(error, _LONGEST_FAULT)
-
-
 def designed(planning: Mapping[str, Any], drive: Drive) -> dict[str, Any]:
     """
     Return the test that tells the answers of a verdict apart, within the limits of the drive.
@@ -199,46 +219,22 @@ def designed(planning: Mapping[str, Any], drive: Drive) -> dict[str, Any]:
             'sheet': dump_sheet(found.tests[0].test) if found.tests else ''}
 
 
-class NextTest:
+class NextTest(Task):
     """
     The design of a next test: asked for, under way, there.
 
-    executor : that designs, after what it has to do already
-    drive : the configuration
+    executor, drive : that designs, and the configuration
     design : what it does, a function of a module
-
-    fault : why there is none although it was asked for; '' if that is not so
     """
 
     def __init__(self, executor: Executor, drive: Drive, design: Design = designed) -> None:
-        self._executor, self._drive, self._design = executor, drive, design
-        self._running: Future[dict[str, Any]] | None = None
+        super().__init__(executor, drive, design)
         self._seconds = 0.0
-        self._found: dict[str, Any] = {}
-        self.fault = ''
-
-    @property
-    def under_way(self) -> bool:
-        """Return whether one is being designed."""
-        return self._running is not None
 
     def begin(self, planning: Mapping[str, Any], seconds: float) -> None:
         """Design one for a verdict after so much testing [s]; what was found before is gone."""
         self._found, self.fault, self._seconds = {}, '', seconds
-        self._running = self._executor.submit(self._design, planning, self._drive)
-
-    def take(self) -> bool:
-        """
-        Take what was found; return whether a design has ended.
-
-        Raises BrokenExecutor: its process was ended.
-        """
-        if self._running is None or not self._running.done():
-            return False
-        future, self._running = self._running, None
-        found, self.fault = outcome(future)
-        self._found = found or {}
-        return True
+        self._ask(planning)
 
     def message(self) -> dict[str, Any]:
         """Return what there is to say, as plain data for JSON."""

@@ -17,7 +17,7 @@ from antenna_drive.parameters.sets import Drive
 from antenna_drive.readings import of, RATE_COMMAND, SIGNALS, TACHOMETER
 from antenna_drive.recording.recording import Recording
 from antenna_drive.recording.sheet import TestSheet
-from antenna_drive.twin.baseline import Baseline, BLOCK_S, ENCODER, interpolated, WashOut
+from antenna_drive.twin.baseline import Baseline, BLOCK_S, interpolated, residual_of, WashOut
 from antenna_drive.twin.intake import InputFaults, Intake
 from antenna_drive.twin.judge import BEHIND_S, BlockJudge, Course, Gap, Pending
 from antenna_drive.twin.quiet_record import learn, Track
@@ -182,10 +182,7 @@ class Twin:
             times = (stamps - start) / NANOSECONDS
             twin = interpolated(times - self.judge.lag(name), course.time,
                                 course.raw)[:, SIGNALS.index(name)]
-            residual = values - twin
-            if SIGNALS.index(name) == ENCODER:
-                spacing = float(np.median(np.diff(times))) if times.size > 1 else 0.01
-                residual = self._publish_wash(residual, spacing)
+            residual = residual_of(SIGNALS.index(name), values, twin, times, self._publish_wash)
             result.append(Compared(name, stamps, twin, residual))
             old = self._pending[name]
             self._pending[name] = (np.append(old[0], times), np.append(old[1], values))

@@ -12,7 +12,6 @@ from xml.etree import ElementTree
 from antenna_drive import cli
 from antenna_drive.article import figures, loaded_axis
 from antenna_drive.article.measures import Results, with_circuits
-from antenna_drive.article.profile_measures import loaded_axis as loop_of_load
 import numpy as np
 import pytest
 from simgap.command.programs import OK
@@ -31,9 +30,9 @@ AXES = {
 def short_load(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """Let the load rise and fall faster than for the true figure: only drawing is tested."""
     monkeypatch.setattr(loaded_axis, 'PERIOD', 8.0)
-    loop_of_load.cache_clear()
+    loaded_axis.loaded.cache_clear()
     yield
-    loop_of_load.cache_clear()
+    loaded_axis.loaded.cache_clear()
 
 
 @pytest.fixture(scope='module')

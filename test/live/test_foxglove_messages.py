@@ -11,7 +11,7 @@ pytest.importorskip('rclpy', reason='rclpy is not installed: no drive to look at
 pytest.importorskip('foxglove', reason='foxglove-sdk is not installed')
 
 from antenna_drive.emulator.run import simulate  # noqa: E402, I100
-from antenna_drive.emulator.wiring import OUTPUTS, TEST_SIGNAL  # noqa: E402
+from antenna_drive.emulator.wiring import DRIVE, OUTPUTS  # noqa: E402
 from antenna_drive.live.foxglove import messages, schema  # noqa: E402
 from antenna_drive.live.history import History  # noqa: E402
 from antenna_drive.parameters import load  # noqa: E402
@@ -22,18 +22,13 @@ UNIT = 'motor_2'
 
 def test_messages_have_the_last_the_least_and_the_greatest_sample() -> None:
     run = simulate(load('new_circuit'), 0.2)
-    history = History({unit: len(signals) for unit, signals in OUTPUTS.items()}, TEST_SIGNAL)
-    columns, column = {}, 0
-    for unit, signals in OUTPUTS.items():
-        columns[unit] = slice(column, column + len(signals))
-        # the steps 0 to 200, of which the motor has not sent step 39
-        kept = np.setdiff1d(np.arange(201), [39] if unit == UNIT else [])
-        samples = run.samples[:, columns[unit]].reshape(201, -1)
-        header = np.column_stack([
-            np.full(201, float(RUN)), np.arange(201), np.full(201, 1e-3), np.full(201, 7.0)])
-        history.take(unit, np.column_stack([header, samples])[kept])
-        column += len(signals)
-    found = dict(messages(history.since(RUN, 0), OUTPUTS[UNIT], columns[UNIT]))
+    history = History(len(DRIVE.signals))
+    history.begin(RUN, run.step_s)
+    for step in np.setdiff1d(run.steps, [39]).tolist():
+        history.take(step, run.samples[step, :, 0])
+    first = [name.partition('/')[0] for name in DRIVE.signals].index(UNIT)
+    columns = slice(first, first + len(OUTPUTS[UNIT]))
+    found = dict(messages(history.since(RUN, 0), OUTPUTS[UNIT], columns))
     assert list(found) == [step * 1_000_000 for step in range(9, 200, 10) if step != 39]
     for time_ns, message in found.items():
         last = round(time_ns * 1e-6)

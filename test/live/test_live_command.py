@@ -196,7 +196,8 @@ def test_a_page_that_does_not_read_costs_no_memory(monkeypatch: pytest.MonkeyPat
 
 
 async def _feed_a_page_that_does_not_read() -> None:
-    history = _Asked({'test_signal': 20}, 'test_signal')
+    history = _Asked(20)
+    history.begin(1, 1e-3)
     session: Any = SimpleNamespace(board=Board(), link=SimpleNamespace(history=history))
     serving = server.Server(session)
     deaf = socket.create_connection(('127.0.0.1', serving.port))
@@ -204,10 +205,10 @@ async def _feed_a_page_that_does_not_read() -> None:
                  b'Connection: Upgrade\r\nSec-WebSocket-Version: 13\r\n'
                  b'Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n')
     step, asked, turns = 0, -1, 0
-    frames = np.zeros((1000, 43))
+    values = np.zeros(20)
     while turns < 50:  # this long it has not asked again, though there was more and more
-        frames[:, :3] = [[1.0, k, 1e-3] for k in range(step, step + 1000)]
-        history.take('test_signal', frames)
+        for k in range(step, step + 1000):
+            history.take(k, values)
         step += 1000
         if step > 100_000:
             turns = turns + 1 if history.asked == asked else 0

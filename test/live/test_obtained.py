@@ -7,7 +7,7 @@ from __future__ import annotations
 from antenna_drive.article.experiments import experiments
 from antenna_drive.article.measures import article_measures, Results, with_circuits
 from antenna_drive.emulator.run import simulate
-from antenna_drive.emulator.wiring import OUTPUTS, TEST_SIGNAL
+from antenna_drive.emulator.wiring import DRIVE
 from antenna_drive.live.experiment_buttons import claims_of, Obtained
 from antenna_drive.live.history import History
 from antenna_drive.parameters import load
@@ -20,24 +20,16 @@ NEAR = {'deg/s': 0.5, 'article A': 0.01, 'A': 0.01, 'V': 0.05, 'percent': 0.6, '
 
 def played(history: History, name: str, run: int, seconds: float | None = None,
            without: slice = slice(0)) -> None:
-    """Let a history see the frames of an experiment, without those of some steps."""
+    """Let a history see an experiment, without some of its steps."""
     experiment = experiments()[name]
     result = simulate(experiment.drive(), seconds or experiment.duration)
-    count = len(result.steps)
-    header = np.column_stack([np.full(count, float(run)), result.steps, np.full(count, 1e-3),
-                              np.full(count, 1.0)])
-    for unit in (TEST_SIGNAL, *(unit for unit in OUTPUTS if unit != TEST_SIGNAL)):
-        columns = [result.names.index(f'{unit}/{signal.name}') for signal in OUTPUTS[unit]]
-        frames = np.hstack([header, result.samples[:, columns].reshape(count, -1)])
-        history.take(unit, np.delete(frames, without, axis=0))
-
-
-def history() -> History:
-    return History({unit: len(signals) for unit, signals in OUTPUTS.items()}, TEST_SIGNAL)
+    history.begin(run, result.step_s)
+    for step in np.delete(result.steps, without).tolist():
+        history.take(step, result.samples[step, :, 0])
 
 
 def test_figures_of_every_experiment_are_those_of_the_article_command() -> None:
-    seen, obtained = history(), Obtained()
+    seen, obtained = History(len(DRIVE.signals)), Obtained()
     results, measures = Results(with_circuits()), article_measures(load())
     for number, name in enumerate(experiments(), 1):
         obtained.begin(seen.run)
@@ -53,7 +45,7 @@ def test_figures_of_every_experiment_are_those_of_the_article_command() -> None:
 
 
 def test_what_is_compared_with_a_run_that_was_not_seen_is_not_known() -> None:
-    seen, obtained = history(), Obtained()
+    seen, obtained = History(len(DRIVE.signals)), Obtained()
     played(seen, 'T2', 7)
     figures = obtained.look('T2', seen)
     assert figures is not None
@@ -62,7 +54,7 @@ def test_what_is_compared_with_a_run_that_was_not_seen_is_not_known() -> None:
 
 
 def test_a_run_that_is_too_short_or_was_missed_tells_nothing() -> None:
-    seen, obtained = history(), Obtained()
+    seen, obtained = History(len(DRIVE.signals)), Obtained()
     played(seen, 'T4a', 1, seconds=7.9)
     assert obtained.look('T4a', seen) is None
     played(seen, 'T4a', 2, without=slice(1000, 2000))

@@ -17,7 +17,7 @@ class Drive:
     """A lock-step thread that makes steps as fast as it may, and runs as often as it is told."""
 
     def __init__(self) -> None:
-        self.control = RunControl(PATIENCE_S)
+        self.control = RunControl(PATIENCE_S, nothing)
         self.step = self.runs = 0
         self._stop = Event()
         self._thread = Thread(target=self._turn)
@@ -55,13 +55,13 @@ def test_a_paused_drive_makes_the_steps_that_are_asked_for_and_no_other() -> Non
     with Drive() as drive:
         control = drive.control
         assert 'not paused' in control.resume()
-        assert 'call pause first' in control.step(1, nothing, PATIENCE_S)
+        assert 'call pause first' in control.step(1, PATIENCE_S)
         for count in (1, 7, 1000):
-            assert control.pause(nothing) == ''
+            assert control.pause() == ''
             at = drive.step
-            assert control.step(count, nothing, PATIENCE_S) == ''
+            assert control.step(count, PATIENCE_S) == ''
             assert drive.step == at + count
-            assert control.step(count, nothing, PATIENCE_S) == ''
+            assert control.step(count, PATIENCE_S) == ''
             assert drive.step == at + 2 * count
             assert control.resume() == ''
             drive.until(lambda at=at, count=count: (  # type: ignore[misc]
@@ -71,32 +71,32 @@ def test_a_paused_drive_makes_the_steps_that_are_asked_for_and_no_other() -> Non
 def test_a_reset_leaves_a_paused_drive_at_step_0_and_lets_another_run() -> None:
     with Drive() as drive:
         control = drive.control
-        assert control.reset(nothing) == ''
+        assert control.reset() == ''
         assert drive.runs == 1
         drive.until(lambda: drive.step > 10)
-        assert control.pause(nothing) == ''
-        assert control.reset(nothing) == ''
-        assert control.pause(nothing) == ''
+        assert control.pause() == ''
+        assert control.reset() == ''
+        assert control.pause() == ''
         assert (drive.step, drive.runs) == (0, 2)
-        assert control.step(3, nothing, PATIENCE_S) == ''
+        assert control.step(3, PATIENCE_S) == ''
         assert drive.step == 3
 
 
 def test_what_nobody_answers_is_said() -> None:
-    control = RunControl(0.0)
-    assert 'come to its next step' in control.pause(nothing)
-    assert 'heard from all' in control.reset(nothing)
+    control = RunControl(0.0, nothing)
+    assert 'come to its next step' in control.pause()
+    assert 'heard from all' in control.reset()
 
 
 def test_a_pause_ends_steps_that_are_under_way() -> None:
     with Drive() as drive:
         control = drive.control
-        assert control.pause(nothing) == ''
-        assert control.step(10**9, nothing, 0.0) == ''
-        assert control.pause(nothing) == ''
+        assert control.pause() == ''
+        assert control.step(10**9, 0.0) == ''
+        assert control.pause() == ''
         at = drive.step
         assert at < 10**9
-        assert control.step(1, nothing, PATIENCE_S) == ''
+        assert control.step(1, PATIENCE_S) == ''
         assert drive.step == at + 1
 
 
@@ -114,9 +114,9 @@ def test_a_state_is_read_as_it_was_told_and_nothing_else_is() -> None:
 
 @pytest.mark.parametrize('step', [0, 5])
 def test_a_drive_that_does_not_step_says_once_that_it_stands(step: int) -> None:
-    control = RunControl(0.0)
+    control = RunControl(0.0, nothing)
     control.begun()
-    control.pause(nothing)
+    control.pause()
     assert control.holds(step)
     assert control.stands(step)
     assert not control.stands(step)

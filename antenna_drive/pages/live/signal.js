@@ -112,7 +112,7 @@ class Form {
     this.asked = asked;
     const told = await this.link.ask({do: 'preview', values, span});
     if (asked !== this.asked) return;
-    this.refused.textContent = told.ok ? '' : told.reason.replace(/^preview\./, '');
+    this.refused.textContent = told.ok ? '' : told.reason.replace(/^rate\./, '');
     this.shown = told.ok ? told.result : null;
     this.draw();
   }
