@@ -65,14 +65,13 @@ def innovations(z: FloatArray, colour: Colour) -> FloatArray:
     return np.asarray(lfilter([1.0, -pole], [1.0, -pole * (1.0 - gain)], z)) / colour.level
 
 
-def estimated(residuals: Sequence[FloatArray], interval_s: float, model_error: float,
+def estimated(residuals: Sequence[FloatArray], interval_s: float, slow_limit: float,
               settings: NoiseSettings) -> Process:
     """
     Return the noise process of a channel from the residuals of each experiment.
 
     These are in standard deviations of the stated noise, shape (n,), NaN where there is none, at
-    an interval [s]. White and slow part have the square of the greatest level at most, together,
-    and the slow one a model's error of this variance besides: more is not noise.
+    an interval [s]. The slow part has the variance `slow_limit` at most: more is not noise.
     """
     usable = [z for z in residuals if np.isfinite(z).sum() >= settings.least_samples]
     if not usable:
@@ -94,7 +93,7 @@ def estimated(residuals: Sequence[FloatArray], interval_s: float, model_error: f
     slow = gain * best * (1.0 - pole ** 2 * (1.0 - gain)) / (1.0 - pole ** 2)
     most = settings.greatest_level ** 2
     level = np.clip((1.0 - gain) * best, 1.0 / most, most)
-    return Process(float(level), min(slow, most - float(level) + model_error), pole)
+    return Process(float(level), min(slow, slow_limit), pole)
 
 
 def with_noise_left(machine: Machine, point: Point, settings: NoiseSettings,
@@ -117,9 +116,10 @@ def with_estimated_noise(experiments: Sequence[Experiment], residuals: Sequence[
         if channel in experiments[0].quantised or not any(item.any() for item in there):
             colours.append(Colour())
             continue
-        error = max(_model_error(e, c, settings) for e in experiments)
+        limit = settings.greatest_level ** 2 + max(
+            _model_error(e, c, settings) for e in experiments)
         interval = float(np.median(np.diff(experiments[0].time)))
-        colours.append(estimated(zs, interval, error, settings).colour)
+        colours.append(estimated(zs, interval, limit, settings).colour)
     return tuple(replace(e, colours=tuple(colours)) for e in experiments)
 
 
