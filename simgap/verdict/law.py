@@ -105,7 +105,7 @@ def likeliest(evidence: InputEvidence, square: FloatArray, slope: FloatArray,
     return best
 
 
-def withheld(evidence: InputEvidence, answers: Sequence[FloatArray]) -> float | None:
+def cross_validated(evidence: InputEvidence, answers: Sequence[FloatArray]) -> float | None:
     """
     Return what a law takes off what is left of each test, as a share, fitted to the others.
 

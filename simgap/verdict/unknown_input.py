@@ -12,7 +12,7 @@ from simgap.fit.least_squares import LeastSquares
 from simgap.machine.contract import DisturbanceInput, FloatArray
 from simgap.machine.pulses import answers
 from simgap.verdict.input_evidence import InputEvidence
-from simgap.verdict.law import Law, likeliest, quantities_of, withheld
+from simgap.verdict.law import cross_validated, Law, likeliest, quantities_of
 
 # Times within which an input changes, in pulses.
 _SMOOTH = (0.0, 5.0)
@@ -72,7 +72,7 @@ def places(problem: LeastSquares, point: Mapping[str, float]) -> list[Place]:
                                        evidence.net(weighed))))
     first, *others = sorted((place for _, place in found), key=lambda place: -place.evidence)
     if first.law:
-        first = replace(first, law=replace(first.law, withheld=withheld(
+        first = replace(first, law=replace(first.law, withheld=cross_validated(
             evidence, answers_of_laws[first.name])))
     return [first, *others]
 

@@ -14,7 +14,7 @@ from simgap.machine.contract import DisturbanceInput, FloatArray, Motion
 from simgap.settings import DEFAULT
 from simgap.verdict.diagnosis import diagnose
 from simgap.verdict.input_evidence import InputEvidence
-from simgap.verdict.law import Law, withheld
+from simgap.verdict.law import cross_validated, Law
 from simgap.verdict.law_form import nearest_form
 from simgap.verdict.unknown_input import places
 from two_lags import answered, TIME, TwoLags
@@ -83,7 +83,7 @@ def test_a_law_is_tried_on_each_test_after_the_others(sign: float, low: float,
     hats = np.maximum(0.0, 1.0 - np.abs(ANGLE[:, np.newaxis] - np.linspace(-1.6, 1.6, 9)) / 0.4)
     moved = np.zeros((TIME.size, 2, 9))
     moved[:, 0] = answered(hats.T).T
-    share = withheld(evidence, [problem.whitened(k, moved.copy()) for k in range(2)])
+    share = cross_validated(evidence, [problem.whitened(k, moved.copy()) for k in range(2)])
     assert share is not None and low < share < high
 
 
