@@ -21,34 +21,32 @@ class DriveDisturbance(DisturbanceInput):
     """
     A place of the drive.
 
-    path : the number of the record that the input is added to
-    size : of one unit of the input, in the unit of that number
+    path : the number of the record that the input is added to, in the unit of that number
     settings : other changes of the record that the input needs: path, how, value
     """
 
     path: str = ''
-    size: float = 0.0
     settings: tuple[tuple[str, str, float], ...] = ()
 
 
 def disturbances(wind: float) -> Iterator[DriveDisturbance]:
     """Yield the places; the wind of every day has this rms [N m]."""
-    yield DriveDisturbance('torque on the axis', 'axis', 'plant.axis.steady_wind_torque', _AXIS,
-                           everyday=wind / _AXIS)
+    yield DriveDisturbance('torque on the axis', 'axis', 'plant.axis.steady_wind_torque',
+                           unit='N m', size=_AXIS, everyday=wind / _AXIS)
     yield DriveDisturbance('voltage in the torque share', 'torque_share',
-                           'torque_share.circuit.fade_out_voltage', 0.2)
+                           'torque_share.circuit.fade_out_voltage', unit='V', size=0.2)
     for m in (1, 2):
         motor, tooth = f'motor_{m}', f'motor_{m}.gearbox.transmission_error'
         yield DriveDisturbance(f'friction of motor {m}', motor, f'{motor}.motor.coulomb_torque',
-                               0.2)
+                               unit='article A', size=0.2)
         yield DriveDisturbance(f'voltage in amplifier {m}', motor, f'{motor}.amplifier.offset',
-                               0.01)
+                               unit='V', size=0.01)
         yield DriveDisturbance(f'reading of tachometer {m}', f'tach_{m}',
-                               f'{motor}.tachometer.offset', 0.2)
+                               f'{motor}.tachometer.offset', unit='rad/s', size=0.2)
         # a transmission error of zero cycles displaces the tooth alike at any angle
-        yield DriveDisturbance(f'displacement in gearbox {m}', f'gearbox_{m}', tooth, 2e-3, (
+        yield DriveDisturbance(f'displacement in gearbox {m}', f'gearbox_{m}', tooth, (
             (tooth, ADD, 1e-12), (f'{tooth}_cycles', SET, 0.0),
-            (f'{tooth}_phase', SET, 0.5 * math.pi)))
+            (f'{tooth}_phase', SET, 0.5 * math.pi)), unit='rad', size=2e-3)
 
 
 def disturbed(plan: batch.Schedule, run: RunSetup, place: DriveDisturbance,

@@ -189,7 +189,8 @@ class AntennaMachine(Machine):
         limit = float(self._tests[experiment].record['motor_1']['motor']['current_limit'][0])
         return Motion(recorded.time, rate=0.5 * (signal('tach_1') + signal('tach_2')),
                       load=signal('current_1') + signal('current_2'), angle=signal('encoder'),
-                      load_limit=2.0 * limit)
+                      load_limit=2.0 * limit,
+                      units={'rate': 'rad/s', 'load': 'article A', 'angle': 'rad'})
 
     # -- running -------------------------------------------------------------------------------
 

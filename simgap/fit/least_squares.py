@@ -15,7 +15,7 @@ from simgap.fit.broyden import Jacobian
 from simgap.fit.levenberg_marquardt import LevenbergMarquardt
 from simgap.fit.noise import innovations, whitened
 from simgap.fit.process_noise import ProcessNoise
-from simgap.fit.robust_loss import robust_level, robust_loss, robust_weight
+from simgap.fit.robust_loss import robust_level, robust_loss, robust_losses, robust_weight
 from simgap.fit.state import FitState, point_of, prior_precision
 from simgap.machine.contract import FloatArray, Machine, Parameter, Point
 from simgap.settings import DEFAULT, Settings
@@ -251,6 +251,12 @@ class LeastSquares:
     def loss(self, residual: FloatArray) -> float:
         """Return the sum of the robust losses."""
         return robust_loss(residual, self.settings.fit.outlier)
+
+    def losses(self, residual: FloatArray) -> FloatArray:
+        """Return the sum of the robust losses of each signal, shape (c,)."""
+        return np.sum([robust_losses(residual[self.rows(k)].reshape(
+            e.measured.shape), self.settings.fit.outlier).sum(axis=0)
+            for k, e in enumerate(self.experiments)], axis=0)
 
     def cost(self, residual: FloatArray, x: FloatArray, prior: FloatArray) -> float:
         """Return the sum of the robust losses and of the priors, given their precision."""

@@ -23,8 +23,12 @@ def robust_level(residual: FloatArray, outlier: float) -> float:
 
 def robust_loss(residual: FloatArray, outlier: float) -> float:
     """Return the sum of losses: half the square of small residuals, logarithmic in large ones."""
+    return float(robust_losses(residual, outlier).sum())
+
+
+def robust_losses(residual: FloatArray, outlier: float) -> FloatArray:
+    """Return the loss of each residual."""
     # after a contact that is made too late everything differs for a while
     size = np.abs(residual)
     large = np.maximum(size, outlier)
-    return float(np.sum(np.where(size < outlier, 0.5 * size ** 2,
-                                 outlier ** 2 * (0.5 + np.log(large / outlier)))))
+    return np.where(size < outlier, 0.5 * size ** 2, outlier ** 2 * (0.5 + np.log(large / outlier)))

@@ -12,7 +12,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass, field
+from dataclasses import dataclass, KW_ONLY
 import math
 from types import MappingProxyType
 from typing import Any
@@ -36,7 +36,10 @@ class DisturbanceInput:
 
     name: str  # unique in its machine, for people
     component: str  # the part of the machine that it acts on
-    everyday: float = field(default=0.0, kw_only=True)  # rms of what acts there every day
+    _: KW_ONLY
+    unit: str = ''  # of what enters
+    size: float = 1.0  # of one unit of a course, which moves the machine a little
+    everyday: float = 0.0  # rms of what acts there every day, in units of a course
 
 
 class Machine(ABC):

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 import math
 
 import numpy as np
@@ -55,6 +55,7 @@ class Motion:
     angle: FloatArray | None = None
     load_limit: float = math.inf  # load at which the drive saturates
     reversal_s: float = 0.4  # time after a reversal that still belongs to it [s]
+    units: Mapping[str, str] = field(default_factory=dict)  # of rate, load and angle
 
     def regimes(self) -> Regimes:
         """Return the regime of each sample; a later test overrides an earlier one."""
@@ -87,6 +88,12 @@ class Motion:
                  'load': self.load, 'angle': self.angle, 'time': self.time,
                  'acceleration': np.gradient(self.rate, self.time)}
         return {name: values for name, values in found.items() if values is not None}
+
+    def unit(self, covariate: str) -> str:
+        """Return the unit of what an input may be a function of; '' for one that is not known."""
+        if covariate == 'acceleration' and 'rate' in self.units:
+            return f'{self.units["rate"]}^2'
+        return self.units.get(covariate, 's' if covariate == 'time' else '')
 
 
 def _moving(rate: FloatArray) -> NDArray[np.bool_]:

@@ -23,6 +23,8 @@ from simgap.model.effects import absent, ORDER_MARK, OwnCatalogue
 
 # Samples of a test that are compared unless the model says how many per second.
 _SAMPLES = 3000
+# Units of positions; with '/s' they are those of rates.
+_POSITIONS = ('rad', 'mrad', 'deg', 'turn', 'rev', 'm', 'mm', 'um')
 
 
 class OwnMachine(Machine):
@@ -47,7 +49,8 @@ class OwnMachine(Machine):
             **{f'{item.name}.{name}': (name, None) for item in model.effects
                for name, _ in absent(item)}}
         self.disturbance_inputs = tuple(
-            DisturbanceInput(item.label, item.component) for item in model.push.values())
+            DisturbanceInput(item.label, item.component, unit=item.unit, size=item.size)
+            for item in model.push.values())
         self.advice = tuple(((), text) for text in model.advice)
         self.diagram = _diagram(model)
 
@@ -148,11 +151,18 @@ class OwnMachine(Machine):
         return [angle(log)[::stride] for log, stride in zip(self.logs, self._strides, strict=True)]
 
     def motion(self, experiment: int) -> Motion:
-        """Return the motion by the first reading, which is taken for a position."""
+        """Return the motion by the first reading whose unit is that of a position or a rate."""
         log, time = self.logs[experiment], self.experiments[experiment].time
-        name, item = next(iter(self.model.readings.items()))
-        position = log[item.column or name][::self._strides[experiment]]
-        return Motion(time, rate=np.gradient(position, time), angle=position,
+        angle, rate, units = None, None, {}
+        for name, item in self.model.readings.items():
+            unit, per_second, _ = item.unit.partition('/s')
+            if unit in _POSITIONS:
+                rate = log[item.column or name][::self._strides[experiment]]
+                units = {'rate': f'{unit}/s', 'angle': unit}
+                if not per_second:
+                    angle, rate = rate, np.gradient(rate, time)
+                break
+        return Motion(time, rate=rate, angle=angle, units=units,
                       reversal_s=min(0.4, 2.0 * self.time_scales.start_s))
 
     def _experiment(self, log: Log, stride: int) -> Experiment:

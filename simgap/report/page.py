@@ -10,6 +10,7 @@ import numpy as np
 from simgap.machine.contract import Experiment, FloatArray
 from simgap.machine.diagram import Diagram
 from simgap.report.curves import Panel
+from simgap.report.law_picture import picture
 from simgap.verdict.record import share_text, value_lines, Verdict
 from simgap.verdict.sentence import headline, is_open, said
 
@@ -44,6 +45,7 @@ def contents(verdict: Verdict, facts: Mapping[str, str] = MappingProxyType({})) 
         'causes': {name: effect.cause for name, effect in effects.items()},
         'numbers': [value_lines(answer.parameters) for answer in verdict.which],
         'explained': '' if fraction['value'] is None else share_text(fraction),
+        'law': next((picture(place.law) for place in verdict.may_enter_at[:1] if place.law), None),
         'panels': panels, 'signals': signals, 'alone': alone, 'advice': _advice(verdict)}
 
 

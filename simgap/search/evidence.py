@@ -18,14 +18,16 @@ does not turn with its bounds; a shape has an even one within them. T is by how 
 a sample counts, because residuals are loud or correlated. Each effect has to gain, for itself,
 what shows an effect beside all that a model leaves out.
 
-No form of an effect is exact, and no model. What an effect gains has to exceed the share of the
-whole gap that such an error leaves.
+No form of an effect is exact, and no model. What effects gain in a signal counts down to the share
+that an error of form leaves there, so that a further effect is not paid for by what the form of
+another one lacks, and may be small in signals that the other one does not move. Each effect also
+has to gain the share of the noise that an error of the model may be.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from simgap.fit.least_squares import LeastSquares
@@ -44,14 +46,20 @@ class Evidence:
     temperature: float  # by how much less than one a sample counts
     gain: float  # of the best over none [half chi-square]
     scale: float = 1.0  # of the noise, where the misfit counts as such
+    # the cost of a residual by signal, and the least that counts, shape (c,) [half chi-square]
+    by_signal: Callable[[FloatArray], FloatArray] = lambda residual: np.zeros(1)
+    least: FloatArray = field(default_factory=lambda: np.zeros(1))
 
     @classmethod
     def among(cls, problem: LeastSquares, hypotheses: Sequence[Hypothesis]) -> Evidence:
         """Return the evidence by what the best of some hypotheses leaves."""
         best = min(hypotheses, key=lambda h: h.cost)
-        none = min((h.cost for h in hypotheses if not h.effects), default=best.cost)
-        return cls(problem.settings.evidence, problem.samples,
-                   temperature(problem, best.state), none - best.cost, problem.scale)
+        none = min((h for h in hypotheses if not h.effects), key=lambda h: h.cost, default=best)
+        options, begins = problem.settings.evidence, problem.losses(none.state.residual)
+        ends = np.min([problem.losses(h.state.residual) for h in hypotheses], axis=0)
+        return cls(options, problem.samples, temperature(problem, best.state),
+                   none.cost - best.cost, problem.scale, problem.losses,
+                   ends + options.form_error ** 2 * np.maximum(begins - ends, 0.0))
 
     def __call__(self, hypothesis: Hypothesis) -> float:
         """Return the logarithm of the evidence times the prior, with the prices."""
@@ -65,7 +73,9 @@ class Evidence:
         # what the nuisances have is that of all hypotheses, and their derivatives err
         occam = 0.5 * float(np.linalg.slogdet(scaled)[1]
                             - np.linalg.slogdet(scaled[np.ix_(shared, shared)])[1])
-        return float(-self.price(hypothesis.forms) - state.cost / self.temperature - occam)
+        cost = state.cost + float(np.maximum(
+            self.least - self.by_signal(state.residual), 0.0).sum())
+        return float(-self.price(hypothesis.forms) - cost / self.temperature - occam)
 
     def _precision(self, state: FitState) -> FloatArray:
         """Return the precision of the priors; a size without one has that of a single sample."""
@@ -81,8 +91,8 @@ class Evidence:
     def price(self, forms: Sequence[Form]) -> float:
         """Return what a hypothesis has to pay for effects of these forms."""
         sought = self.settings.sought * sum(form.scanned for form in forms)
-        shows = self.settings.shows / self.scale ** 2
-        return len(forms) * (shows + self.settings.form_error ** 2 * self.whole) + sought
+        shows = self.settings.shows + 0.5 * self.settings.form_error ** 2 * self.samples
+        return len(forms) * shows / self.scale ** 2 + sought
 
     @property
     def whole(self) -> float:

@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 import math
+from typing import NamedTuple
 
 import numpy as np
 from scipy import linalg
@@ -20,6 +21,15 @@ _RATIOS = np.logspace(-4.0, 4.0, 25)
 # Lags by which a reading may predict itself, whatever it is that repeats.
 _LAGS = 20
 _FIRST = np.eye(1, _LAGS)[0]
+
+
+class Weighed(NamedTuple):
+    """Independent inputs of some factors, as likely as they can be."""
+
+    evidence: float  # natural logarithm of how much likelier they make the residual
+    share: float  # of its energy that they explain
+    factors: FloatArray  # shape (m,)
+    deviations: FloatArray  # of the factors, shape (m,)
 
 
 class InputEvidence:
@@ -54,13 +64,20 @@ class InputEvidence:
                  nuisances: FloatArray, prior: FloatArray, process_error: float = 0.0) -> None:
         self.residual, self._weight = residual, weight
         self._loud, self.process_error = loud, process_error
-        weighted = nuisances * weight[:, np.newaxis]
-        square = nuisances.T @ weighted + np.diag(prior)
+        self._nuisances, self._prior = nuisances, prior
+        square = nuisances.T @ (nuisances * weight[:, np.newaxis]) + np.diag(prior)
         self._inverse = np.linalg.pinv(square, hermitian=True)
-        self._slope, self._weighted = weighted.T @ residual, weighted
-        self._energy = float(residual @ (weight * residual)
-                             - self._slope @ self._inverse @ self._slope)
+        self._slope = nuisances.T @ (weight * residual)
+        self.energy = float(residual @ (weight * residual)
+                            - self._slope @ self._inverse @ self._slope)
         self._count = float(np.count_nonzero(weight))
+
+    def during(self, tests: Sequence[slice]) -> InputEvidence:
+        """Return that of some tests alone, given their rows."""
+        weight = np.zeros_like(self._weight)
+        for rows in tests:
+            weight[rows] = self._weight[rows]
+        return InputEvidence(self.residual, self._loud, weight, self._nuisances, self._prior)
 
     def reduced(self, responses: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
         """Return the normal equations of inputs without what the nuisances can do."""
@@ -71,7 +88,7 @@ class InputEvidence:
             weighted = columns * self._weight[rows, np.newaxis]
             squares.append(columns.T @ weighted)
             slopes.append(weighted.T @ self.residual[rows])
-            crosses.append(self._weighted[rows].T @ columns)
+            crosses.append(self._nuisances[rows].T @ weighted)
         cross = np.concatenate(crosses, axis=1)
         projected = cross.T @ self._inverse
         return (linalg.block_diag(*squares) - projected @ cross,
@@ -85,30 +102,29 @@ class InputEvidence:
         size = float(np.trace(square)) / len(square)
         for pulses in smooth if size > 0.0 else ():
             roots = [root(count, pulses) if pulses else np.eye(count) for count in counts]
-            found, explained, factors = self.weighed(
+            found = self.weighed(
                 _rows(roots, _rows(roots, square).T), _rows(roots, slope), size)
-            if found > best:
-                best, share = found, explained
-                heights = _rows([part.T for part in roots], factors)
+            if found.evidence > best:
+                best, share = found.evidence, found.share
+                heights = _rows([part.T for part in roots], found.factors)
         return best, share, heights
 
-    def weighed(self, square: FloatArray, slope: FloatArray, size: float,
-                ) -> tuple[float, float, FloatArray]:
-        """Return the evidence for independent inputs, their share of the energy, and factors."""
-        best, share, factors = 0.0, 0.0, np.zeros(len(square))
+    def weighed(self, square: FloatArray, slope: FloatArray, size: float) -> Weighed:
+        """Return independent inputs, given their normal equations and the size of these."""
         values, vectors = np.linalg.eigh(0.5 * (square + square.T) / size)
-        values = np.maximum(values, 0.0)
+        stiff = np.maximum(values, 0.0)[:, np.newaxis] + 1.0 / _RATIOS
         turned = vectors.T @ slope
-        along = turned ** 2 / size
-        for ratio in _RATIOS:
-            left = self._energy - float(np.sum(along / (values + 1.0 / ratio)))
-            left = max(left / self._energy, 1e-9)
-            evidence = -0.5 * (self._count * np.log(left)
-                               + float(np.sum(np.log1p(ratio * values))))
-            if evidence > best:
-                best, share = float(evidence), 1.0 - left
-                factors = vectors @ (turned / (values + 1.0 / ratio)) / size
-        return best, share, factors
+        along = np.sum((turned ** 2)[:, np.newaxis] / stiff, axis=0) / size
+        left = np.maximum(1.0 - along / self.energy, 1e-9)
+        evidence = -0.5 * (self._count * np.log(left) + np.log(_RATIOS * stiff).sum(axis=0))
+        best = int(np.argmax(evidence))
+        if evidence[best] <= 0.0:
+            return Weighed(0.0, 0.0, np.zeros(len(square)), np.zeros(len(square)))
+        noise = left[best] * self.energy / max(self._count, 1.0)
+        return Weighed(
+            float(evidence[best]), float(1.0 - left[best]),
+            vectors @ (turned / stiff[:, best]) / size,
+            np.sqrt(noise * (vectors ** 2 @ (1.0 / stiff[:, best])) / size))
 
     def net(self, evidence: float) -> float:
         """Return the share of the energy whose loss alone would be worth this evidence."""

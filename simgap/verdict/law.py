@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from simgap.fit.least_squares import LeastSquares
@@ -18,7 +18,17 @@ _PLACES = 12
 _REACHED = 0.05
 # What an input may be in proportion to.
 _FACTORS = ('direction', 'load', 'rate')
-Quantities = Mapping[str, Sequence[FloatArray]]
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """Something that a machine does: its unit, and its values in each test."""
+
+    unit: str
+    values: Sequence[FloatArray]
+
+
+Quantities = Mapping[str, Quantity]
 
 
 @dataclass(frozen=True)
@@ -30,45 +40,93 @@ class Law:
     evidence: float  # natural logarithm of how much likelier it makes the gap
     at: tuple[float, ...]  # values of the quantity
     values: tuple[float, ...]  # of the input there, over the factor
+    deviations: tuple[float, ...]  # standard deviations of these values
+    by_unit: str  # of the quantity
+    unit: str  # of the values
+    # share of what is left of each test that the law takes, fitted to the others; None for one test
+    withheld: float | None = None
 
     def __str__(self) -> str:
         return self.by + (f', in proportion to {self.times}' if self.times else '')
 
+    def in_units(self, size: float, unit: str) -> Law:
+        """Return the law of an input, one of which is of a size in a unit."""
+        per = f'{unit}/({self.unit})' if self.unit else unit
+        return replace(self, values=tuple(size * value for value in self.values), unit=per,
+                       deviations=tuple(size * value for value in self.deviations))
+
 
 def quantities_of(problem: LeastSquares, point: Mapping[str, float]) -> Quantities:
-    """Return what the machine does, by name: values at the samples of each test."""
-    found: dict[str, list[FloatArray]] = {}
+    """Return what the machine does, by name, at the samples of each test."""
+    found: dict[str, Quantity] = {}
+    values: dict[str, list[FloatArray]] = {}
     for k, experiment in enumerate(problem.experiments):
-        own = dict(zip(experiment.channels, problem.machine.predict(point, k).T, strict=True))
-        for name, values in {**problem.machine.motion(k).covariates(), **own}.items():
-            found.setdefault(name, []).append(np.asarray(values))
-    return {name: values for name, values in found.items()
-            if len(values) == len(problem.experiments) and np.ptp(np.concatenate(values)) > 0.0}
+        motion, predicted = problem.machine.motion(k), problem.machine.predict(point, k).T
+        for name, own in motion.covariates().items():
+            found[name] = Quantity(motion.unit(name), values.setdefault(name, []))
+            values[name].append(np.asarray(own))
+        for name, unit, own in zip(experiment.channels, experiment.units, predicted, strict=True):
+            found[name] = Quantity(unit, values.setdefault(name, []))
+            values[name].append(np.asarray(own))
+    return {name: item for name, item in found.items()
+            if len(item.values) == len(problem.experiments)
+            and np.ptp(np.concatenate(item.values)) > 0.0}
 
 
 def likeliest(evidence: InputEvidence, square: FloatArray, slope: FloatArray,
-              quantities: Quantities) -> Law | None:
-    """Return the likeliest law of an input, given its normal equations; None if none helps."""
-    # `quantities` have values at the pulses of each test
+              quantities: Quantities) -> tuple[Law, FloatArray] | None:
+    """
+    Return the likeliest law of an input, given its normal equations; None if none helps.
+
+    `quantities` have values at the m pulses of all tests. The second is what the pulses have of
+    the law's k values, shape (m, k).
+    """
     best = None
-    factors = {'': None, **{name: quantities[name] for name in _FACTORS if name in quantities}}
+    factors = {'': Quantity('', ()), **{
+        name: quantities[name] for name in _FACTORS if name in quantities}}
     for times, factor in factors.items():
-        weight = 1.0 if factor is None else np.concatenate(factor)[:, np.newaxis]
-        for by, values in quantities.items():
+        weight = np.concatenate(factor.values)[:, np.newaxis] if times else 1.0
+        for by, quantity in quantities.items():
             if by == times:
                 continue
-            at, columns = _hats(np.concatenate(values))
+            at, columns = _hats(np.concatenate(quantity.values))
             reached = np.abs(weight * columns).max(axis=0)
             kept = reached > _REACHED * reached.max()
             columns = (weight * columns)[:, kept]
             own = columns.T @ square @ columns
             if (size := float(np.trace(own)) / max(len(own), 1)) <= 0.0:
                 continue
-            found, _, heights = evidence.weighed(own, columns.T @ slope, size)
-            found -= evidence.process_error
-            if found > (best.evidence if best else 0.0):
-                best = Law(by, times, found, tuple(at[kept].tolist()), tuple(heights.tolist()))
+            found = evidence.weighed(own, columns.T @ slope, size)
+            gained = found.evidence - evidence.process_error
+            if gained > (best[0].evidence if best else 0.0):
+                best = Law(by, times, gained, tuple(at[kept].tolist()),
+                           tuple(found.factors.tolist()), tuple(found.deviations.tolist()),
+                           quantity.unit, factor.unit), columns
     return best
+
+
+def cross_validated(evidence: InputEvidence, answers: Sequence[FloatArray]) -> float | None:
+    """
+    Return what a law takes off what is left of each test, as a share, fitted to the others.
+
+    `answers` of each test are those to the law's k values, shape (n c, k). None with one test.
+    """
+    ends = np.cumsum([len(item) for item in answers])
+    tests = [slice(end - len(item), end) for end, item in zip(ends.tolist(), answers, strict=True)]
+    if len(tests) < 2:
+        return None
+    same = np.tile(np.eye(answers[0].shape[1]), (len(tests), 1))
+    before = after = 0.0
+    for k, rows in enumerate(tests):
+        others, own = evidence.during([*tests[:k], *tests[k + 1:]]), evidence.during([rows])
+        (square, slope), (own_square, own_slope) = (
+            (same.T @ whole @ same, same.T @ side)
+            for whole, side in (part.reduced(answers) for part in (others, own)))
+        size = max(float(np.trace(square)) / len(square), 1e-30)
+        values = others.weighed(square, slope, size).factors
+        before += own.energy
+        after += own.energy - float(values @ (2.0 * own_slope - own_square @ values))
+    return 1.0 - after / before if before > 0.0 else None
 
 
 def _hats(values: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -11,6 +11,8 @@ from simgap.next_test.design import objective_for, SEPARATE
 from simgap.next_test.rivals import Findings
 from simgap.settings import DEFAULT
 from simgap.verdict.intervals import jackknife, TWO_SIDED_95
+from simgap.verdict.law import Law
+from simgap.verdict.law_form import nearest_form
 from simgap.verdict.spoken import percent, quantity, size, with_interval
 
 if TYPE_CHECKING:
@@ -171,10 +173,30 @@ def _unknown(verdict: Verdict) -> str:
                      f'{quantity(sizes[name]["before_in_unit"], sizes[name]["unit"])} rms.')
     if verdict.may_enter_at:
         place = verdict.may_enter_at[0]
-        law = f', best as a function of {place.law}' if place.law else ''
+        as_law = f', best as a function of {place.law}' if place.law else ''
         lines.append(f'As {place.name} it could explain {percent(place.explained)} of the gap'
-                     f'{law}.')
+                     f'{as_law}.')
+        if place.law:
+            lines.append(_law(place.law))
     return ' '.join([*lines, *_when(verdict)])
+
+
+def _law(law: Law) -> str:
+    """Return a law in words: its extremes, what it is like, and what withheld data say of it."""
+    least, most = (choose(range(len(law.values)), key=lambda j: law.values[j])
+                   for choose in (min, max))
+    low, high = sorted((least, most))
+    form, lacks = nearest_form(law)
+    text = (f'It goes from {quantity(law.values[low], law.unit)} at '
+            f'{quantity(law.at[low], law.by_unit)} to {quantity(law.values[high], law.unit)} at '
+            f'{quantity(law.at[high], law.by_unit)}, most like {form}, which lacks '
+            f'{percent(lacks)} of it')
+    if law.withheld is None:
+        return f'{text}.'
+    if law.withheld <= 0.0:
+        return f'{text}; fitted to the other recordings it takes nothing off what is left of one.'
+    return (f'{text}; fitted to the other recordings it takes {percent(law.withheld)} off what is '
+            'left of one.')
 
 
 def _when(verdict: Verdict) -> Iterator[str]:

@@ -5,14 +5,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from simgap.fit.least_squares import LeastSquares
 from simgap.machine.contract import DisturbanceInput, FloatArray
 from simgap.machine.pulses import answers
 from simgap.verdict.input_evidence import InputEvidence
-from simgap.verdict.law import Law, likeliest, quantities_of
+from simgap.verdict.law import cross_validated, Law, likeliest, quantities_of
 
 # Times within which an input changes, in pulses.
 _SMOOTH = (0.0, 5.0)
@@ -36,22 +36,33 @@ def places(problem: LeastSquares, point: Mapping[str, float]) -> list[Place]:
     evidence, channels = InputEvidence.at(problem, point), problem.experiments[0].channels
     quantities = quantities_of(problem, point)
     found = []
+    answers_of_laws: dict[str, list[FloatArray]] = {}
 
-    def judged(name: str, component: str, responses: Sequence[FloatArray],
+    def judged(place: DisturbanceInput, responses: Sequence[FloatArray],
                peaks: Sequence[FloatArray], smooth: Sequence[float]) -> None:
         square, slope = evidence.reduced(responses)
-        weighed, share, _ = evidence.of_course(square, slope, [p.size for p in peaks], smooth)
-        law = likeliest(evidence, square, slope, {
-            quantity: [np.interp(moments, e.time, own) for moments, e, own in zip(
-                peaks, problem.experiments, values, strict=True)]
-            for quantity, values in quantities.items()})
-        weighed = max(weighed, law.evidence if law else 0.0)
-        found.append((share, Place(name, component, weighed, evidence.net(weighed), law)))
+        counts = [moments.size for moments in peaks]
+        weighed, share, _ = evidence.of_course(square, slope, counts, smooth)
+        law = None
+        if likely := likeliest(evidence, square, slope, {
+                name: replace(quantity, values=[
+                    np.interp(moments, e.time, own) for moments, e, own in zip(
+                        peaks, problem.experiments, quantity.values, strict=True)])
+                for name, quantity in quantities.items()}):
+            law = likely[0].in_units(place.size, place.unit)
+            answers_of_laws[place.name] = [own @ part for own, part in zip(
+                responses, np.split(likely[1], np.cumsum(counts)[:-1]), strict=True)]
+            weighed = max(weighed, law.evidence)
+        found.append((share, Place(place.name, place.component, weighed, evidence.net(weighed),
+                                   law)))
 
     for place in problem.machine.disturbance_inputs:
-        judged(place.name, place.component, *_columns(problem, point, place), _SMOOTH)
+        judged(place, *_columns(problem, point, place), _SMOOTH)
     for c, channel in enumerate(channels):
-        judged(f'reading of {channel}', channel, *_of_reading(problem, c), (0.0,))
+        reading = DisturbanceInput(
+            f'reading of {channel}', channel, unit=problem.experiments[0].units[c],
+            size=float(np.median(np.concatenate([e.noise[:, c] for e in problem.experiments]))))
+        judged(reading, *_of_reading(problem, c, reading.size), (0.0,))
     # what repeats itself too fast for a pulse, such as a hum, lies in its reading
     most = 2.0 * max(share for share, _ in found)
     for c, channel in enumerate(channels):
@@ -59,7 +70,11 @@ def places(problem: LeastSquares, point: Mapping[str, float]) -> list[Place]:
         if share > most:
             found.append((share, Place(f'reading of {channel}', channel, weighed,
                                        evidence.net(weighed))))
-    return sorted((place for _, place in found), key=lambda place: -place.evidence)
+    first, *others = sorted((place for _, place in found), key=lambda place: -place.evidence)
+    if first.law:
+        first = replace(first, law=replace(first.law, withheld=cross_validated(
+            evidence, answers_of_laws[first.name])))
+    return [first, *others]
 
 
 def courses(problem: LeastSquares, point: Mapping[str, float],
@@ -94,9 +109,9 @@ def components(found: Sequence[Place], caution: float) -> dict[str, float]:
     return {name: value / total for name, value in weight.items()}
 
 
-def _of_reading(problem: LeastSquares,
-                channel: int) -> tuple[list[FloatArray], list[FloatArray]]:
-    """Return pulses of a reading itself, and their peaks, as `_columns` does."""
+def _of_reading(problem: LeastSquares, channel: int,
+                size: float) -> tuple[list[FloatArray], list[FloatArray]]:
+    """Return pulses of a reading itself, of a size, and their peaks, as `_columns` does."""
     responses, peaks = [], []
     for k, experiment in enumerate(problem.experiments):
         # the cost grows with the third power of their number
@@ -104,7 +119,7 @@ def _of_reading(problem: LeastSquares,
         rise = max(problem.machine.time_scales.pulse_s, (last - float(time[0])) / _MOST_PULSES)
         moments = np.arange(float(time[0]), last - 2.0 * rise, rise) + rise
         pulses = np.zeros((*experiment.measured.shape, moments.size))
-        pulses[:, channel] = experiment.noise[:, channel, np.newaxis] * np.maximum(
+        pulses[:, channel] = size * np.maximum(
             0.0, 1.0 - np.abs(time[:, np.newaxis] - moments) / rise)
         responses.append(problem.whitened(k, pulses))
         peaks.append(moments)

@@ -173,19 +173,39 @@ def test_an_order_that_was_sought_has_its_price() -> None:
     assert evidence(single) - evidence(sought) == pytest.approx(DEFAULT.evidence.sought)
 
 
-@pytest.mark.parametrize('tempered', [1.0, 3.0])
-def test_an_effect_has_to_gain_more_than_an_error_of_form_leaves(tempered: float) -> None:
-    """A form wrong by a share leaves the square of that share of its gain."""
-    problem = LeastSquares(machine(2, {'a.size': 3.0, 'c.size': 0.5}))
-    none, single, pair, three = (
-        fitted(problem, effects) for effects in ('', 'a', 'ac', 'acd'))
-    gain = none.cost - min(pair.cost, three.cost)
-    found = Evidence.among(problem, [none, single, pair, three])
-    assert found.gain == pytest.approx(gain)
-    plainly, dear = plain(problem, tempered), plain(problem, tempered, gain)
-    price = DEFAULT.evidence.form_error ** 2 * gain / tempered
-    for hypothesis, times in ((none, 0), (single, 1), (pair, 2), (three, 3)):
-        assert plainly(hypothesis) - dear(hypothesis) == pytest.approx(times * price)
+class TwoSignals(Linear):
+    """The same with two signals: the first half of the rows of its columns is the first one."""
+
+    def __init__(self, measured: FloatArray, columns: FloatArray) -> None:
+        super().__init__(measured, columns)
+        half = measured.size // 2
+        self.experiments = [Experiment(
+            'one', np.linspace(0.0, 1.0, half), ('y', 'w'), ('1', '1'),
+            measured.reshape(2, half).T.copy(), np.full((half, 2), NOISE))]
+
+    def predict(self, point: Point, experiment: int) -> FloatArray:
+        """Return the sum of the columns."""
+        return super().predict(point, experiment).reshape(2, -1).T.copy()
+
+
+@pytest.mark.parametrize('small', [0.35, 0.05])
+def test_an_error_of_form_hides_an_effect_in_its_own_signals_alone(small: float) -> None:
+    """A form wrong by a twentieth, what imitates the error, and an effect elsewhere."""
+    random = np.random.default_rng(2)
+    columns = random.normal(size=(1200, len(NUMBERS)))
+    columns[600:, :3], columns[:600, 3:] = 0.0, 0.0
+    clean = columns @ [0.0, 10.0, 0.5, small, 0.0]
+    problem = LeastSquares(TwoSignals(clean + NOISE * random.normal(size=1200), columns),
+                           settings=TO_THE_END.changed('fit.outlier', 1e3))
+    none, single, imitated, elsewhere = hypotheses = [
+        fitted(problem, effects) for effects in ('', 'a', 'ab', 'ac')]
+    evidence = Evidence.among(problem, hypotheses)
+    error = DEFAULT.evidence.form_error ** 2 * (none.cost - single.cost)
+    for further in (imitated, elsewhere):
+        assert single.cost - further.cost < error
+    named = elsewhere if small == 0.35 else single
+    assert single.cost - imitated.cost > single.cost - elsewhere.cost
+    assert evidence.ranked(hypotheses)[0] is named
 
 
 def test_hypotheses_are_ranked_by_their_evidence() -> None:

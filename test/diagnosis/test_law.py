@@ -4,15 +4,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from simgap.fit.least_squares import LeastSquares
-from simgap.machine.contract import FloatArray, Motion
+from simgap.machine.contract import DisturbanceInput, FloatArray, Motion
 from simgap.settings import DEFAULT
 from simgap.verdict.diagnosis import diagnose
-from simgap.verdict.law import Law
+from simgap.verdict.input_evidence import InputEvidence
+from simgap.verdict.law import cross_validated, Law
+from simgap.verdict.law_form import nearest_form
 from simgap.verdict.unknown_input import places
-from two_lags import TIME, TwoLags
+from two_lags import answered, TIME, TwoLags
 
 ANGLE: FloatArray = np.sin(0.9 * TIME) + 0.6 * np.sin(1.7 * TIME + 0.4)
 RATE: FloatArray = np.gradient(ANGLE, TIME)
@@ -25,7 +30,7 @@ class Turning(TwoLags):
 
     def motion(self, experiment: int) -> Motion:
         """Return how it turns."""
-        return Motion(TIME, rate=RATE, angle=ANGLE, load=LOAD)
+        return Motion(TIME, rate=RATE, angle=ANGLE, load=LOAD, units={'angle': 'rad'})
 
 
 def likeliest(left: FloatArray) -> tuple[str, Law]:
@@ -50,6 +55,7 @@ def test_a_force_is_found_as_the_function_that_it_is(by: str, times: set[str],
     factor = {'': 1.0, 'direction': np.sign(RATE), 'load': LOAD}[law.times]
     drawn = factor * np.interp(quantities[by], law.at, law.values)
     assert np.corrcoef(drawn, force)[0, 1] > 0.95
+    assert law.withheld is None
 
 
 def test_noise_has_no_law() -> None:
@@ -62,3 +68,50 @@ def test_a_law_that_noise_could_pass_for_is_no_noise() -> None:
     found = diagnose(Turning(0.15 * np.sign(RATE), NOTHING))
     assert (found.word, found.where[0]['signal']) == ('unknown_effect', 'seen left')
     assert diagnose(Turning(NOTHING, NOTHING)).word == 'no_gap'
+
+
+@pytest.mark.parametrize('sign, low, high', [(1.0, 0.7, 1.0), (-1.0, -10.0, 0.0)])
+def test_a_law_is_tried_on_each_test_after_the_others(sign: float, low: float,
+                                                      high: float) -> None:
+    """A spring takes nearly all off a test that it was not fitted to, one of other sign nothing."""
+    machine = Turning(2.0 * ANGLE, NOTHING)
+    other = Turning(2.0 * sign * ANGLE, NOTHING)
+    two = machine.with_experiments([*machine.experiments, replace(
+        other.experiments[0], name='two')])
+    problem = LeastSquares(two)
+    evidence = InputEvidence.at(problem, {})
+    hats = np.maximum(0.0, 1.0 - np.abs(ANGLE[:, np.newaxis] - np.linspace(-1.6, 1.6, 9)) / 0.4)
+    moved = np.zeros((TIME.size, 2, 9))
+    moved[:, 0] = answered(hats.T).T
+    share = cross_validated(evidence, [problem.whitened(k, moved.copy()) for k in range(2)])
+    assert share is not None and low < share < high
+
+
+def test_a_law_has_the_units_of_its_place_and_deviations_that_hold() -> None:
+    """Nineteen of twenty values lie within two deviations of the force, in newtons."""
+    machine = Turning(3.0 * np.sin(ANGLE), NOTHING)
+    machine.disturbance_inputs = (DisturbanceInput(
+        'force on the left', 'left', unit='mN', size=1000.0),)
+    [law] = (place.law for place in places(LeastSquares(machine), {})
+             if place.component == 'left' and place.law)
+    assert (law.by, law.unit, law.by_unit) == ('angle', 'mN', 'rad')
+    off = np.array(law.values) - 3000.0 * np.sin(law.at)
+    off -= off.mean()
+    assert np.mean(np.abs(off) < 2.0 * np.array(law.deviations) + 30.0) > 0.8
+    assert nearest_form(law)[0] == 'a straight line' or nearest_form(law)[1] < 0.05
+
+
+@pytest.mark.parametrize('shape, form', [
+    (lambda x: 2.0 * x, 'a straight line'),
+    (lambda x: 0.5 * np.sign(x), 'a jump at zero (Coulomb friction)'),
+    (lambda x: np.sign(x) * np.maximum(np.abs(x) - 1.2, 0.0), 'a spring with slack, none within'),
+    (lambda x: np.sign(x) * (1.0 + np.exp(-(x / 0.75) ** 2)), 'Stribeck friction, within 0.75'),
+    (lambda x: x * np.abs(x), 'its square with its sign'),
+])
+def test_the_nearest_form_is_the_one_that_it_is(shape: Callable[[FloatArray], FloatArray],
+                                                form: str) -> None:
+    at = np.linspace(-3.0, 3.0, 12)
+    values = shape(at) + 0.02 * np.random.default_rng(1).normal(size=12)
+    name, lacks = nearest_form(Law('rate', '', 99.0, tuple(at), tuple(values), (0.02,) * 12,
+                                   'rad/s', 'N'))
+    assert name.startswith(form) and lacks < 0.02

@@ -142,7 +142,8 @@ def test_agreement_is_not_said_beside_a_remainder_that_is_louder_than_noise() ->
 
 def test_unknown_says_place_size_and_when_and_what_would_settle_it() -> None:
     place = SimpleNamespace(name='force on the carriage', component='carriage', explained=0.83,
-                            law=Law('angle', 'load', 31.0, (0.0, 1.0), (0.0, 2.0)))
+                            law=Law('angle', 'load', 31.0, (0.0, 1.0, 2.0), (0.5, 0.0, -2.0),
+                                    (0.1, 0.1, 0.1), 'rad', 'N/A', 0.4))
     found = said(verdict(
         'unknown_effect', Named(['unknown'], 0.9, {}), may_enter_at=[place],
         where=[{'component': 'carriage', 'signal': 'angle', 'regime': 'reversal', 'share': 0.6}],
@@ -152,7 +153,10 @@ def test_unknown_says_place_size_and_when_and_what_would_settle_it() -> None:
     assert found.what == (
         'Something acts that no known effect explains, most likely in carriage; it shows most in '
         'angle (reversal). The model misses angle by 0.0432 rad rms. As force on the carriage it '
-        'could explain 83 percent of the gap, best as a function of angle, in proportion to load.')
+        'could explain 83 percent of the gap, best as a function of angle, in proportion to load. '
+        'It goes from 0.5 N/A at 0 rad to -2 N/A at 2 rad, most like a parabola, which lacks less '
+        'than 0.1 percent of it; fitted to the other recordings it takes 40 percent off what is left of '
+        'one.')
     assert 'one test is not enough' in found.then and '`propose`' in found.then
 
 

@@ -89,7 +89,9 @@ def diagnosis(result: dict[str, Any], read: Sequence[int] = (1,), **machine: Any
         'word': result['verdict'], 'which': [Named(**answer) for answer in result['which']],
         'may_enter_at': [
             Place(place['name'], place['component'], 1.0, place['explained'],
-                  Law(evidence=1.0, at=(0.0,), values=(0.0,), **place['law']))
+                  Law(evidence=1.0, at=(-1.0, 0.0, 3.0), values=(-0.5, 0.0, 1.5),
+                      deviations=(0.1, 0.0, 0.25), by_unit='rad/s', unit=HOSTILE,
+                      **place['law']))
             for place in result['may_enter_at']],
         'machine': model, 'none': fit, 'best': fit})
 
