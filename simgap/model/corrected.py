@@ -74,7 +74,7 @@ def found_of(verdict: Verdict, joint: str) -> Found:
                     | {'delay' if item.act == 'delays' else f'{item.act} {item.target}':
                        item.factor * numbers[item.number] for item in simulate.actions
                        if item.is_of({**simulate.inputs, **simulate.readings})})
-    return Found(joint, simulate.longest_step_s, *told, {
+    return Found(joint, simulate.longest_step_s, told[0], told[1], {
         name: value for name, value in told[1].items()
         if abs(value - told[0][name]) > _SAME * abs(told[0][name])})
 
@@ -107,7 +107,7 @@ def _mjcf(source: Path, found: Found) -> tuple[bytes, dict[str, str]]:
             drive.tag, value, math.ceil(found.now['delay'] / found.step_s) + 2)}
     if not now.keys().isdisjoint(_TWIST):
         now |= {name: found.now[name] for name in ('rotor', *_TWIST)}
-        places |= dict.fromkeys(_TWIST, (joint, {}))
+        places |= {name: (joint, {}) for name in _TWIST}
         _insert_twist(text, joint, model, value, found)
     if found.now['coulomb']:
         text.change(joint, **DRY)

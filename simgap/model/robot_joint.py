@@ -52,15 +52,15 @@ def _servo(words: Sequence[str]) -> dict[str, float]:
     """Return kp [N m/rad], kv [N m s/rad] and limit [N m] of a drive, as far as they are told."""
     told, kinds = f'--drive {" ".join(words)}', {
         'position': ('kp', 'kv', 'limit'), 'ros2_control': ('p', 'd', 'u_clamp_max')}
-    given = dict(word.partition('=')[::2] for word in words[1:])
-    names = kinds.get(words[0], ())
+    given = {name: value for name, _, value in (word.partition('=') for word in words[1:])}
+    names = kinds.get(words[0], kinds['position'])
     try:
         found = {name: float(value) for name, value in mapping_of('', given, names).items()}
     except ValueError as error:
-        raise ModelError(f'{told}: {error}; give position kp=.. kv=.. limit=.. or ros2_control '
-                         'p=.. d=.. u_clamp_max=..') from None
-    if not found.get(names[0], 0.0) > 0.0:
-        raise ModelError(f'{told}: {names[0]}: give a number above 0')
+        raise ModelError(f'{told}: {error}') from None
+    if words[0] not in kinds or not found.get(names[0], 0.0) > 0.0:
+        raise ModelError(f'{told}: allowed are position kp=.. kv=.. limit=.. and ros2_control '
+                         'p=.. d=.. u_clamp_max=.., the first one above 0')
     return {name: found[own] for name, own in zip(kinds['position'], names) if own in found}
 
 
@@ -149,7 +149,7 @@ def _body(model: mujoco.MjModel, data: mujoco.MjData, number: int,
         'drag_known': "the file's" if viscous else None, 'gravity': gravity, 'step': step,
         'spring': model.jnt_stiffness[number].flat[0],
         'rest': model.qpos_spring[model.jnt_qposadr[number]],
-        'integrator': ('Euler', 'RK4', 'implicit', 'implicitfast')[model.opt.integrator],
+        'integrator': 'Euler RK4 implicit implicitfast discrete'.split()[model.opt.integrator],
         'stiffness': stiffness, 'gap': '0 0', 'loss': loss, 'much_loss': 50.0 * loss,
         # a healthy gearbox may be twice as soft as the stiffest, the softest swings at 5 Hz
         'rigid': 1.0 / stiffness, 'soft': 1.0 / (both * (2.0 * math.pi * 5.0) ** 2)}

@@ -124,7 +124,7 @@ def test_what_hangs_on_a_joint_moves_as_the_robot_does(robot: str, options: list
     assert {'gearbox.backlash', 'motor.ripple', 'joint.stribeck', 'encoder.zero'} <= names
 
 
-FAULTS = {
+FAULTS: dict[str, dict[str, float]] = {
     'nothing': {}, 'friction': {'joint.friction.friction': 0.05, 'viscous': 0.002},
     'compliance': {'gearbox.compliance.compliance': 0.1},
     'backlash': {'gearbox.backlash.half_gap': 0.03}, 'delay': {'controller.delay.delay': 0.0075},
@@ -191,7 +191,7 @@ def test_laws_that_mujoco_lacks_act(tmp_path: Path) -> None:
         return machine.predict({name.replace('__', '.'): value for name, value in point.items()},
                                0)[400:, 1]
 
-    # the reference is held for a sample, so the torque has a small saw-tooth: differences have none
+    # a reference that is held for a sample makes a small saw-tooth, which differences lack
     plain = torque()
     more = torque(joint__friction_asymmetry__asymmetry=0.5) - plain
     np.testing.assert_allclose(more, 0.5 * 0.02, rtol=0.01)
@@ -205,9 +205,10 @@ def test_laws_that_mujoco_lacks_act(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(('options', 'words'), [
     (['--joint', 'elbw'], 'no hinge elbw, did you mean elbow?'),
-    (['--joint', 'elbow', '--drive', 'position', 'kp=x'], "could not convert string to float: 'x'"),
-    (['--joint', 'elbow', '--drive', 'pid', 'kp=1'], 'give position kp=..'),
-    (['--joint', 'elbow', '--drive', 'position', 'kv=1'], 'kp: give a number above 0')])
+    (['--joint', 'elbow', '--drive', 'position', 'kp=x'], 'could not convert string to float'),
+    (['--joint', 'elbow', '--drive', 'position', 'ki=1'], 'ki: no such entry'),
+    (['--joint', 'elbow', '--drive', 'pid', 'kp=1'], 'allowed are position kp=..'),
+    (['--joint', 'elbow', '--drive', 'position', 'kv=1'], 'the first one above 0')])
 def test_mistakes_are_told_in_a_line(options: list[str], words: str, tmp_path: Path,
                                      capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / 'arm.xml').write_text(MJCF)
