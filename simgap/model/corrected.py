@@ -64,7 +64,7 @@ def found_of(verdict: Verdict, joint: str) -> Found:
     simulate = machine.model.simulate
     assert isinstance(simulate, FileSimulation)
     told: list[dict[str, float]] = []
-    for point in ({}, verdict.best.state.point()):
+    for point in (dict[str, float](), verdict.best.state.point()):
         numbers, defaults = machine.numbers(point, 0), simulate.simulator.defaults.tolist()
         values = simulate.acted(dict(zip(simulate.places, defaults, strict=True)), numbers)
         places = {place: place.replace(f'.{joint}', '.J', 1) for place in values

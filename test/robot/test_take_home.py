@@ -75,7 +75,7 @@ def made(folder: Path, robot: str = MJCF, *options: str) -> tuple[OwnMachine, Pa
     return OwnMachine(load_model(str(out)), [LOG]), out
 
 
-def replayed(mjcf: Path, extra: str = '') -> NDArray[np.float64]:
+def replayed(mjcf: Path) -> NDArray[np.float64]:
     """Return angle and torque of the joint in plain MuJoCo, held from sample to sample."""
     model = mujoco.MjModel.from_xml_path(str(mjcf))
     data = mujoco.MjData(model)
