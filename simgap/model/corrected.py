@@ -137,7 +137,7 @@ def _insert_twist(text: XmlText, joint: Element, model: Any, value: Mapping[str,
     """Insert the twist behind the motor, and change whatever else has to follow."""
     own = model.joint(found.joint)
     words = {**value, 'joint': found.joint, 'axis': text_of(own.axis), 'pos': text_of(own.pos),
-             'gap': f'-{value["half_gap"]} {value["half_gap"]}'}
+             'gap': text_of(found.now['half_gap'] * np.array([-1.0, 1.0]) + 0.0)}
     text.insert(TWIST.substitute(words), joint)
     text.insert(TEETH.substitute(words), text.root.children[-1])
     for key in text.root.find('key'):  # the twist has a coordinate, too
