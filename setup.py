@@ -81,7 +81,7 @@ setup(
     version='0.1.0',
     packages=[*find_packages(include=[PACKAGE, f'{PACKAGE}.*']), *ENGINE],
     package_dir=ENGINE if CARRIED else {},
-    package_data={'': ['py.typed', '*.yaml', '*.html', '*.js', '*.css', 'LICENSE'],
+    package_data={'': ['py.typed', '*.yaml', '*.xml', '*.html', '*.js', '*.css', 'LICENSE'],
                   f'{PACKAGE}.pages': ['templates/*', 'live/*'],
                   engine('simgap.report'): ['templates/*', 'uplot/*']},
     cmdclass={'build_py': BuildWithEngine},

@@ -11,6 +11,7 @@ from simgap.command.program import Command, Program
 
 COMMANDS = {
     'inspect': Command('inspect_', 'say what is in a recording, and write a first map of it'),
+    'machine-from': Command('machine_from', 'make a model of a joint from MJCF or URDF'),
     'check': Command('check', 'say what is wrong with a model, before any fit'),
     'diagnose': Command('diagnose', 'say where machine and model part, and why'),
     'propose': Command('propose', 'design the next test: the one that settles a verdict'),

@@ -43,6 +43,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('logs', nargs='+', metavar='LOG', help='logs of its tests')
     add_map_option(parser)
     add_diagnosis_options(parser, 'angle=0.001')
+    parser.add_argument('--corrected', type=Path, metavar='FILE',
+                        help='write the MJCF or URDF that simgap machine-from made the model of, '
+                             'with what was found')
 
 
 def add_map_option(parser: argparse.ArgumentParser) -> None:
@@ -80,6 +83,9 @@ def diagnosed(name: str, paths: Sequence[str], arguments: argparse.Namespace) ->
     from simgap.model import diagnose_logs, load_model, read_logs
 
     model, earlier = load_model(name), earlier_of(arguments.after)
+    if arguments.corrected:  # whether it can be done is told before the diagnosis
+        from simgap.model.corrected import source_of
+        source = source_of(Path(name), arguments.corrected)
     with reading():
         logs = read_logs(paths, arguments.map)
     with Progress('diagnosis', 1.0) as progress:
@@ -88,8 +94,24 @@ def diagnosed(name: str, paths: Sequence[str], arguments: argparse.Namespace) ->
             settings_of(arguments.threshold), arguments.without,
             dict(numbers_of('--matters', arguments.matters)), earlier)
     write_report(arguments.report, verdict, facts(f'simgap {__version__}', name, '', paths))
-    give(verdict.as_data(), arguments.json, verdict.summary())
+    lines = _write_corrected(verdict, arguments.corrected, source) if arguments.corrected else ()
+    give(verdict.as_data(), arguments.json, '\n'.join([verdict.summary(), *lines]))
     return int(verdict.word == 'too_few_to_judge')
+
+
+def _write_corrected(verdict: Verdict, target: Path, source: tuple[Path, str]) -> Iterator[str]:
+    """Write a corrected file, and a table of what it cannot say; yield what was done."""
+    from simgap.model.corrected import corrected, found_of
+    data, rows = corrected(source[0], found_of(verdict, source[1]))
+    left = ''.join(f'{name},{before},{now}\n' for name, before, now, where in rows if not where)
+    texts = {target: data} | ({target.with_suffix('.csv'): f'what,before,now\n{left}'.encode()}
+                              if left else {})
+    for place, text in texts.items():
+        with replaced(place) as stream:
+            stream.write(text)
+        yield f'{place}: ' + ('what was found' if text is data else 'what such a file cannot say')
+    yield from (f'  {name} {before:.6g} -> {now:.6g}: {where or "not said"}'
+                for name, before, now, where in rows)
 
 
 def earlier_of(path: Path | None) -> Sequence[Rival]:

@@ -13,17 +13,20 @@ from simgap.inputs.plain_yaml import read_yaml
 from simgap.inputs.schema import Entry, mapping_of, ParameterError, quoted
 from simgap.logs.log import OneTest
 from simgap.machine.contract import FloatArray
-from simgap.model.declaration import effect, free, known, machine, shape, size, within
+from simgap.model.declaration import (
+    effect, free, known, machine, ripple, shape, size, within)
 from simgap.model.declared import Model, ModelError, Number, Numbers, OwnEffect, Push, Reading
 from simgap.model.simulator import Ports, Simulator
 
 _PROGRAMS = ('mujoco', 'fmu')
 _TOP = (*_PROGRAMS, 'step_s', 'inputs', 'starts', 'constants', 'base', 'per_test', 'readings',
-        'effects', 'push', 'settles_s', 'judged_hz', 'blocks', 'advice')
-# What a number may do, in the order in which it is done. The last one is to an input.
+        'effects', 'push', 'settles_s', 'judged_hz', 'blocks', 'advice', 'source')
+# What a number may do, in the order in which it is done. Inputs are delayed; inputs and readings
+# are scaled and added to, as places are.
 _ACTS = ('sets', 'scales', 'adds', 'adds_to_inverse', 'delays')
 _KINDS = ('known', 'share', 'by', 'free', 'size', 'shape')
-_OF_EFFECT = ('cause', 'simpler', 'numbers')
+_OF_EFFECT = ('cause', 'simpler', 'numbers', 'ripple')
+_OF_RIPPLE = ('size', 'unit', 'tolerance', 'angle', 'orders', 'into')
 _NUMBER = Entry('')
 _POSITIVE = Entry('', low=1e-12)
 # A sample counts as there at a time that differs by less than this share of a step.
@@ -39,6 +42,10 @@ class _Action:
     act: str
     target: str
     factor: float
+
+    def is_of(self, signals: Collection[str]) -> bool:
+        """Return whether it is done to one of these inputs or readings, and to no place."""
+        return self.act == 'delays' or self.act in ('scales', 'adds') and self.target in signals
 
 
 def load_model_file(path: Path) -> Model:
@@ -71,7 +78,7 @@ def _model(path: Path, top: Mapping[str, Any]) -> Model:
         if entries[str(body.get('into', name))] != key:
             raise ModelError(f'{key}: into: two pushes enter at {body.get("into", name)}; leave '
                              'one out')
-    targets = {item.target: item.key for item in actions if item.act != 'delays'}
+    targets = {item.target: item.key for item in actions if not item.is_of({**inputs, **readings})}
     ports = Ports(
         {**targets, **dict.fromkeys(starts, 'starts'), **dict.fromkeys(constants, 'constants')},
         dict.fromkeys(inputs, 'inputs'),
@@ -85,7 +92,7 @@ def _model(path: Path, top: Mapping[str, Any]) -> Model:
         if item.target not in given and math.isnan(defaults.get(item.target, 0.0)):
             raise ModelError(f'{item.key}: {item.target}: {top[program[0]]} gives it no value; '
                              'let a number set it first')
-    simulate = _Simulation(
+    simulate = FileSimulation(
         simulator, tuple(ports.places), _optional('step_s', top) or simulator.longest_step_s,
         tuple(sorted(actions, key=lambda item: _ACTS.index(item.act))), inputs, starts, constants,
         tuple(pushes), {name: list(ports.outputs).index(str(body.get('from', name)))
@@ -104,7 +111,7 @@ def _model(path: Path, top: Mapping[str, Any]) -> Model:
 
 
 @dataclass(frozen=True)
-class _Simulation:
+class FileSimulation:
     """A simulation program as the `simulate` of a machine."""
 
     simulator: Simulator
@@ -129,7 +136,7 @@ class _Simulation:
         columns += [test.push[name][held] for name in self.pushes]
         inputs = np.column_stack(columns) if columns else np.empty((count, 0))
         found = self.simulator.run(self._values(numbers, test), float(time[0]), step, inputs)
-        return {reading: np.interp(time, grid, found[:, place])
+        return {reading: self._altered(reading, np.interp(time, grid, found[:, place]), numbers)
                 for reading, place in self.readings.items()}
 
     def _values(self, numbers: Numbers, test: OneTest) -> FloatArray:
@@ -141,7 +148,13 @@ class _Simulation:
             values[place] = test.constants[name]
         for place, column in self.starts.items():
             values[place] = float(test[column][0])
+        return np.array(list(self.acted(values, numbers).values()))
+
+    def acted(self, values: dict[str, float], numbers: Numbers) -> dict[str, float]:
+        """Return the values of places after what numbers do to them."""
         for item in self.actions:
+            if item.is_of({**self.inputs, **self.readings}):
+                continue
             change = item.factor * numbers[item.number]
             if item.act == 'sets':
                 values[item.target] = change
@@ -154,10 +167,19 @@ class _Simulation:
                     raise ModelError(f'{item.key}: {item.target}: it is 0, which has no inverse; '
                                      'add to it, or set it')
                 values[item.target] = 1.0 / (1.0 / values[item.target] + change)
-        return np.array(list(values.values()))
+        return values
+
+    def _altered(self, name: str, course: FloatArray, numbers: Numbers) -> FloatArray:
+        """Return the course of an input or reading, scaled and added to if numbers say so."""
+        for item in self.actions:
+            if item.target == name and item.is_of((name,)) and item.act != 'delays':
+                change = item.factor * numbers[item.number]
+                course = course * (1.0 + change) if item.act == 'scales' else course + change
+        return course
 
     def _late(self, name: str, course: FloatArray, numbers: Numbers, step: float) -> FloatArray:
-        """Return the course of an input, delayed if a number says so."""
+        """Return the course of an input, altered and delayed if numbers say so."""
+        course = self._altered(name, course, numbers)
         delay = sum(item.factor * numbers[item.number] for item in self.actions
                     if item.act == 'delays' and item.target == name)
         if delay == 0.0:
@@ -201,6 +223,11 @@ def _actions(top: Mapping[str, Any]) -> Iterator[_Action]:
         for target, factor in mapping_of(f'{key}.{acts[0]}', targets).items():
             yield _Action(f'{key}.{acts[0]}', name, acts[0], str(target),
                           _number(f'{key}.{acts[0]}.{target}', factor))
+    for key, name, body in _bodies('effects', top, _OF_EFFECT):
+        into = mapping_of(f'{key}.ripple', body.get('ripple', {}), _OF_RIPPLE).get('into')
+        yield from (_Action(f'{key}.ripple.into', f'{name}_{part}'.replace('.', '_'), 'sets',
+                            f'{into}_{part}', 1.0)
+                    for part in ('cosine', 'sine', 'order') if 'ripple' in body)
 
 
 def _check_actions(actions: list[_Action], inputs: Mapping[str, str]) -> None:
@@ -240,6 +267,14 @@ def _value(key: str, given: object, body: Mapping[str, Any],
 
 
 def _effect(key: str, name: str, body: Mapping[str, Any]) -> OwnEffect:
+    cause = _text(f'{key}.cause', body.get('cause', ''))
+    if 'ripple' in body:
+        item, where = body['ripple'], f'{key}.ripple'
+        amplitude = size(*_pair(f'{where}.size', item.get('size')), _unit(where, item),
+                         tolerance=_number(f'{where}.tolerance', item.get('tolerance', 0.0)))
+        orders = [_number(f'{where}.orders', order) for order in item.get('orders', ())]
+        return ripple(name, name.replace('.', '_'), amplitude, _text(
+            f'{where}.angle', item.get('angle')), orders, cause=cause)
     numbers = {}
     for where, one, item in _bodies('numbers', body, before=f'{key}.'):
         unit, step = _unit(where, item), _number(f'{where}.step', item.get('step', 0.0))
@@ -251,8 +286,8 @@ def _effect(key: str, name: str, body: Mapping[str, Any]) -> OwnEffect:
             numbers[one] = shape(
                 *_pair(f'{where}.shape', item['shape']),
                 _number(f'{where}.start', item.get('start')), unit, step=step)
-    return effect(name, cause=_text(f'{key}.cause', body.get('cause', '')),
-                  simpler=_text(f'{key}.simpler', body.get('simpler', '')), **numbers)
+    simpler = _text(f'{key}.simpler', body.get('simpler', ''))
+    return effect(name, cause=cause, simpler=simpler, **numbers)
 
 
 def _kind(key: str, body: Mapping[str, Any], allowed: Collection[str]) -> str:

@@ -5,7 +5,9 @@ A MuJoCo model (MJCF) as the simulation of a machine.
 
 A place is KIND.NAME.FIELD, with [INDEX] where the field, of MuJoCo's mjModel without its prefix,
 has several values: joint.motor.damping, actuator.servo.biasprm[1], joint.motor.qpos (where it
-starts), or option.gravity[2].
+starts), or option.gravity[2]. What MuJoCo lacks is law.JOINT.FIELD: a number of the friction of a
+hinge or slide, `parts.friction.Friction`, beside the joint's own frictionloss and damping, or
+ripple_order, ripple_cosine, ripple_sine, of a wave of torque by its angle.
 """
 
 from collections.abc import Iterable
@@ -21,6 +23,7 @@ from simgap.inputs.schema import nearest
 from simgap.machine.contract import FloatArray
 from simgap.model.declared import ModelError
 from simgap.model.simulator import Ports
+from simgap.parts import friction, wave
 
 _PLACE = re.compile(r'(?P<kind>\w+)\.(?:(?P<name>.+)\.)?(?P<field>\w+)(?:\[(?P<index>\d+)\])?')
 # Prefixes of the arrays of mjModel, and the kind by which an object is found.
@@ -38,6 +41,12 @@ _STATE = int(mujoco.mjtState.mjSTATE_FULLPHYSICS)
 # What MuJoCo says of a run that diverges.
 _DIVERGED = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL,
              mujoco.mjtWarning.mjWARN_BADQACC)
+# A law is Friction's numbers but for coulomb and viscous, which the joint has, and a ripple.
+_LAW = {**{name: value for name, value in friction.Friction._field_defaults.items()
+           if name not in ('coulomb', 'viscous')},
+        'ripple_order': 1.0, 'ripple_cosine': 0.0, 'ripple_sine': 0.0}
+# Those of which one that is not 0 lets it act.
+_SIZES = [not name.endswith(('_rate', '_shape', '_order')) for name in _LAW]
 _INPUTS = int(mujoco.mjtState.mjSTATE_CTRL | mujoco.mjtState.mjSTATE_QFRC_APPLIED)
 
 # A fit also tries numbers with which a run diverges. MuJoCo would write each to standard error
@@ -100,6 +109,7 @@ class _Worker:
     def __init__(self, model: mujoco.MjModel, places: Iterable[str] = ()) -> None:
         self._model = copy.copy(model)
         self._data = mujoco.MjData(self._model)
+        self._laws: dict[int, FloatArray] = {}  # by joint
         cells = [(place, self.cell(place, '')) for place in places]
         self._parameters = [(k, cell) for k, (place, cell) in enumerate(cells)
                             if not _is_start(place)]
@@ -119,12 +129,35 @@ class _Worker:
         self._data.time = start_s
         state = np.empty(mujoco.mj_stateSize(self._model, _STATE))
         mujoco.mj_getState(self._model, self._data, state, _STATE)
+        if any(law[_SIZES].any() for law in self._laws.values()):
+            return self._stepped(controls)
         # a step reads the sensors before it moves the bodies
         _, sensors = self._rollout.rollout(self._model, self._data, state, controls[np.newaxis],
                                            control_spec=_INPUTS)
         found = np.asarray(sensors[0])
         if any(self._data.warning[kind].number for kind in _DIVERGED):
             found[round((self._data.time - start_s) / step_s):] = np.nan
+        return found
+
+    def _stepped(self, controls: FloatArray) -> FloatArray:
+        """Return what `run` does, of a run in which laws give each step its friction."""
+        model, data = self._model, self._data
+        found = np.empty((len(controls), model.nsensordata))
+        loss, damping = model.dof_frictionloss, model.dof_damping
+        own = [(model.jnt_qposadr[joint], dof, loss[dof], damping[dof], friction.Friction(
+            loss[dof], damping[dof], *law[:-3].tolist()), law[-3:].tolist())
+            for joint, law in self._laws.items() for dof in (model.jnt_dofadr[joint],)]
+        for k, row in enumerate(controls):
+            data.ctrl[:], data.qfrc_applied[:] = row[:model.nu], row[model.nu:]
+            for place, dof, _, _, law, ripple in own:
+                angle, rate = data.qpos[place], data.qvel[dof]
+                loss[dof] = friction.level(law, rate, data.qfrc_actuator[dof], angle)
+                damping[dof] = friction.drag(law, rate)
+                data.qfrc_applied[dof] += wave(angle, *ripple)
+            mujoco.mj_step(model, data)
+            found[k] = data.sensordata
+        for _, dof, level, drag, *_ in own:
+            loss[dof], damping[dof] = level, drag
         return found
 
     def cell(self, place: str, key: str) -> FloatArray:
@@ -151,9 +184,13 @@ class _Worker:
             if field == 'timestep':
                 raise ModelError(f'{key}: {place}: give step_s in the model file')
             return found if isinstance(found, np.ndarray) else None
+        if kind == 'law' and field in _LAW:
+            joint = _id(model, mujoco.mjtObj.mjOBJ_JOINT, 'joint', name, f'{key}: {place}')
+            law = self._laws.setdefault(joint, np.array(list(_LAW.values())))
+            return law[(at := list(_LAW).index(field)):at + 1]
         if kind not in _KINDS:
             raise ModelError(f'{key}: {place}: no such kind{nearest(kind, _KINDS)}; there are '
-                             f'{", ".join(_KINDS)}, option')
+                             f'{", ".join(_KINDS)}, option, law with {", ".join(_LAW)}')
         prefix, code = _KINDS[kind]
         number = _id(model, code, kind, name, f'{key}: {place}')
         if kind == 'joint':

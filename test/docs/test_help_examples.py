@@ -60,6 +60,7 @@ TRIALS = ('antenna-drive calibrate', 'antenna-drive investigate', 'simgap invest
 ELSEWHERE = {'lab ': 'the laboratory takes hours, or needs a trial that took them',
              '--scheduler tcp://host:8786': 'there is no cluster of that name',
              'ros2 service': 'needs the ros2 command line and a drive, see test/ros2cli',
+             'simgap machine-from': 'it needs a robot and MuJoCo, see test/robot',
              'my_machine.yaml': 'MuJoCo models are tested in test/own'}
 
 

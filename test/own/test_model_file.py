@@ -81,6 +81,23 @@ def machine_of(folder: Path, text: str = TEXT) -> OwnMachine:
     return OwnMachine(load_model(f'{folder}/m.yaml'), [LOG])
 
 
+def test_numbers_act_on_readings_and_inputs_and_waves_on_places(
+        stand_in: list[StandIn], tmp_path: Path) -> None:
+    machine = machine_of(tmp_path, TEXT.replace('  force: {from', '  told: {from').replace(
+        'push:', '  sensor.error: {numbers: {error: {size: [-1.0, 1.0], adds: {first: 1.0, '
+        'force: 2.0}}}}\n  sensor.gain: {numbers: {gain: {size: [-1.0, 1.0], scales: told}}}\n'
+        '  motor.wave: {ripple: {size: [-1.0, 1.0], angle: angle_rad, orders: [3], into: wave}}\n'
+        'push:'))
+    plain = machine.predict({}, 0)
+    np.testing.assert_allclose(machine.predict({'sensor.error.error': 0.5}, 0) - plain,
+                               np.tile([0.5, 1.0], (10, 1)))
+    np.testing.assert_allclose(machine.predict({'sensor.gain.gain': 0.5}, 0),
+                               plain * [1.0, 1.5])
+    machine.predict({'motor.wave.motor_wave_sine@3': 0.25}, 0)
+    values = stand_in[-1].values
+    assert [values[f'wave_{part}'] for part in ('order', 'cosine', 'sine')] == [3.0, 0.0, 0.25]
+
+
 def test_numbers_effects_and_readings_are_those_of_a_declaration(
         tmp_path: Path, stand_in: list[StandIn]) -> None:
     model = machine_of(tmp_path).model
