@@ -173,7 +173,8 @@ def _drive(model: mujoco.MjModel, number: int, told: Mapping[str, float],
         limit = min(limit or math.inf, float(model.jnt_actfrcrange[number, 1]) / abs(gear))
     stiff = -bias[1] * gear ** 2
     torque = limit * abs(gear) or max(0.3 * stiff, words['pull']) or 1.0
-    attributes = {'gear': gear, 'gainprm': gain, 'biasprm': bias} | (
+    attributes: dict[str, float | FloatArray] = {
+        'gear': gear, 'gainprm': gain, 'biasprm': bias} | (
         {'forcerange': np.array([-limit, limit])} if limit else {})
     return {
         'drive': 'biastype="affine" ' + ' '.join(

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 import pytest
 from simgap.cli import main
 from simgap.inputs.xml_text import XmlText
+from simgap.machine.contract import FloatArray
 from simgap.model import load_model, Log, OwnMachine
 from simgap.verdict.record import Verdict
 
@@ -58,7 +59,7 @@ URDF = """\
     <origin xyz="0.2 0 0"/></joint>
 </robot>
 """
-TIME = 0.002 * np.arange(700)
+TIME: FloatArray = 0.002 * np.arange(700, dtype=np.float64)
 # at rest at first: a delay of MuJoCo begins with a control of 0
 REFERENCE = np.where(TIME < 0.1, 0.0, np.where(TIME % 0.5 < 0.25, 0.5, -0.1))
 LOG = Log('steps', TIME, {'reference': REFERENCE, 'position': 0.0 * TIME, 'effort': 0.0 * TIME})
