@@ -173,9 +173,9 @@ def _drive(model: mujoco.MjModel, number: int, told: Mapping[str, float],
         limit = min(limit or math.inf, float(model.jnt_actfrcrange[number, 1]) / abs(gear))
     stiff = -bias[1] * gear ** 2
     torque = limit * abs(gear) or max(0.3 * stiff, words['pull']) or 1.0
-    attributes: dict[str, float | FloatArray] = {
-        'gear': gear, 'gainprm': gain, 'biasprm': bias} | (
-        {'forcerange': np.array([-limit, limit])} if limit else {})
+    attributes: dict[str, float | FloatArray] = {'gear': gear, 'gainprm': gain, 'biasprm': bias}
+    if limit:
+        attributes['forcerange'] = np.array([-limit, limit])
     return {
         'drive': 'biastype="affine" ' + ' '.join(
             f'{name}="{text_of(value)}"' for name, value in attributes.items()),
