@@ -32,7 +32,7 @@ help:
 
 set-up: $(READY)
 
-$(READY): setup.py setup.cfg pyproject.toml antenna_drive/ros_releases.py scripts/set-up
+$(READY): setup.py lab/pyproject.toml setup.cfg pyproject.toml antenna_drive/ros_releases.py scripts/set-up
 	scripts/set-up $(VENV)
 	@touch $@
 

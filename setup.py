@@ -109,7 +109,6 @@ setup(
     extras_require={
         **ROS['extras'](),
         'plot': ['matplotlib >= 3.6'],
-        'calibrate': ['cma >= 3.2'],
         'parquet': ['pyarrow >= 10'],
         # trials, studies, calibrations and fleets on a cluster
         'cluster': ['dask[distributed] >= 2024.1'],
@@ -127,7 +126,6 @@ setup(
         # bags of other machines; the first rosbags that reads a storage file alone
         'bags': ['mcap >= 1.5', 'rosbags >= 0.11', 'mcap-protobuf-support >= 0.5'],
         'test': [
-            'cma >= 3.2',
             # pytest-xdist 3.8 finds a test's group by an attribute that pytest 9.2 does not read
             'pytest >= 7.4, < 9.2',
             'pytest-timeout >= 2.2',

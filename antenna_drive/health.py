@@ -265,7 +265,6 @@ PARTS: dict[str, Callable[[], Iterator[Finding]]] = {
         'live': ('tornado',),
         'foxglove': ('foxglove',),
         'parquet': ('pyarrow',),
-        'calibrate': ('cma',),
         'cluster': ('distributed',),
         'completion': ('shtab',),
         'mujoco': ('mujoco',),

@@ -12,7 +12,6 @@ REMEDIES.update(dict.fromkeys((
     'sensor_msgs'), ROS_REMEDY))
 REMEDIES.update({
     'matplotlib': 'pip install matplotlib',
-    'cma': 'pip install cma',
     'distributed': "pip install 'dask[distributed]'",
     'shtab': 'pip install shtab',
     'tornado': 'pip install tornado',

@@ -9,7 +9,7 @@ The basis says what a passing row proves:
 - derived: a parameter or a command was computed from this figure, so the row holds by
   construction.
 - fitted: the shipped parameter sets were fitted to this figure, or it follows from one that they
-  were fitted to. config/calibration/article.yaml lists the targets of the fit.
+  were fitted to. lab/calibration/article.yaml lists the targets of the fit.
 - predicted: no parameter was set from it.
 """
 

@@ -25,7 +25,6 @@ COMMANDS = {
                                       'sheets'),
     'article': Command('article', "repeat the article's experiments and compare the figures"),
     'accuracy': Command('accuracy', 'measure how far a macro-step is from the converged run'),
-    'calibrate': Command('calibrate', 'fit parameters to the published figures'),
     'record': Command('record', 'record a run of the five nodes'),
     'export': Command('export', 'turn a recording into CSV'),
     'import': Command('import_', 'turn a CSV from the field into a recording'),
@@ -42,5 +41,5 @@ COMMANDS = {
     'confusability': Command('confusability', 'measure which effects can be told apart'),
 }
 
-PROGRAM = Program('antenna-drive', __name__, __version__, COMMANDS)
+PROGRAM = Program('antenna-drive', __name__, __version__, COMMANDS, {'calibrate': 'lab calibrate'})
 main, make_parser = PROGRAM.main, PROGRAM.parser

@@ -9,8 +9,6 @@ from pathlib import Path
 import struct
 from typing import Any, NamedTuple
 
-from antenna_drive.calibration.problem import read_problem
-from antenna_drive.calibration.search import read_log
 from antenna_drive.emulator.wiring import OUTPUTS
 from antenna_drive.lockstep.changes import read_record
 from antenna_drive.lockstep.frame import FrameLayout
@@ -23,6 +21,8 @@ from antenna_drive.recording.csv_format import read_csv, write_csv
 from antenna_drive.recording.files import import_file, load_map
 from antenna_drive.recording.recording import Recording
 from antenna_drive.recording.sheet import load_sheet, parse_sheet
+from lab.calibration.problem import read_problem, SHIPPED
+from lab.calibration.search import read_log
 from lab.campaign.mutating import as_json, as_yaml
 from lab.trials.scorecard import score
 from lab.trials.scored_cases import read_scored
@@ -155,9 +155,8 @@ def reader(name: str, folder: Path) -> Reader:
             b'axis: {mode_inertias: {value: [2.6e+6, 1.3e+6, 7.5e+5], unit: kg m^2,\n'
             b'  range: [1.0, 1.0e+12], source: fitted}}\n'), lambda path: load(path / 'own.yaml'))
     if name == 'targets':
-        return _yaml_reader('targets.yaml', next(
-            (config_dir() / 'calibration').glob('*.yaml')).read_bytes(),
-            lambda path: read_problem(path / 'targets.yaml'))
+        return _yaml_reader('targets.yaml', (SHIPPED / 'article.yaml').read_bytes(),
+                            lambda path: read_problem(path / 'targets.yaml'))
     if name == 'verdict':
         return _json_reader('verdict.json', VERDICT,
                             lambda path: read_verdict(path / 'verdict.json'))

@@ -8,6 +8,7 @@ It runs from a checkout and is never installed with the drive. lab/README.md say
 
 from lab import __version__
 from simgap.command.program import Command, Program
+from simgap.command.remedies import REMEDIES
 
 COMMANDS = {
     'trial': Command('trial', 'make sealed test cases with an independent antenna'),
@@ -17,9 +18,11 @@ COMMANDS = {
     'twin-trial': Command('twin_trial', 'test the twin on sealed antennas that change'),
     'score': Command('score', 'score the verdicts of a trial against its truths'),
     'servo': Command('servo', 'say what the model of an ordinary servo lacks'),
+    'calibrate': Command('calibrate', 'fit parameters to the published figures'),
     'bench': Command('bench', 'measure speed'),
     'campaign': Command('campaign', 'look for faults: kills, garbage, damaged files, full disks'),
 }
 
+REMEDIES['cma'] = 'make set-up, or pip install cma'
 PROGRAM = Program('lab', __name__, __version__, COMMANDS)
 main, make_parser = PROGRAM.main, PROGRAM.parser

@@ -4,7 +4,7 @@
 
 import argparse
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 import difflib
 import importlib
 import sys
@@ -36,6 +36,7 @@ class Program:
     package: str  # whose modules are the subcommands; its docstring is the description
     version: str  # printed by --version
     commands: Mapping[str, Command]  # by name
+    moved: Mapping[str, str] = field(default_factory=dict)  # what to type for a former command
 
     def main(self, argv: Sequence[str] | None = None) -> int:
         """Run the program; return one of the exit codes that `--help` lists."""
@@ -53,8 +54,9 @@ class Program:
 
     def _run(self, name: str, arguments: list[str]) -> int:
         if name and name not in self.commands:
-            close = difflib.get_close_matches(name, self.commands, n=1)
-            guess = f'did you mean {close[0]}?' if close else f'{self.name} --help lists them'
+            close = difflib.get_close_matches(name, [*self.commands, *self.moved], n=1)
+            guess = (f'did you mean {self.moved.get(close[0], close[0])}?' if close else
+                     f'{self.name} --help lists them')
             raise UserError(f'no such command, {guess}')
         parsed = self.parser(name).parse_args(arguments)
         # parse_args has left by now unless there was a command

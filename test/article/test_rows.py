@@ -14,10 +14,9 @@ from antenna_drive import cli
 from antenna_drive.article.contradictions import contradictions
 from antenna_drive.article.measures import Results, with_circuits
 from antenna_drive.article.published import CLAIMS, Row, rows
-from antenna_drive.calibration.problem import read_problem
 from antenna_drive.cli.article import CONFIGURATION
-from antenna_drive.parameters.files import config_dir
 from antenna_drive.parameters.sets import changed
+from lab.calibration.problem import read_problem, SHIPPED
 import numpy as np
 import pytest
 from simgap.command.programs import BAD_INPUT, OK
@@ -173,7 +172,7 @@ def test_a_conclusion_follows_from_the_configuration() -> None:
 
 @pytest.mark.parametrize('seed', [1, 2])
 def test_the_basis_of_a_row_says_what_the_free_parameters_change(seed: int) -> None:
-    problem = read_problem(config_dir() / 'calibration' / 'article.yaml')
+    problem = read_problem(SHIPPED / 'article.yaml')
     start = np.array(problem.start())
     moved = start + 0.05 * np.random.default_rng(seed).choice([-1.0, 1.0], start.size)
     before = by_id(rows(problem.results(start.tolist()), ['T5']))
@@ -200,7 +199,7 @@ def test_no_target_of_the_fit_counts_as_a_prediction() -> None:
     bases = {claim.measure: claim.basis for claim in CLAIMS}
     assert set(bases.values()) == {'published', 'derived', 'fitted', 'predicted'}
     targets = {target.figure for target in
-               read_problem(config_dir() / 'calibration' / 'article.yaml').targets}
+               read_problem(SHIPPED / 'article.yaml').targets}
     assert {bases[figure] for figure in targets & bases.keys()} == {'derived', 'fitted'}
 
 

@@ -7,11 +7,12 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from antenna_drive.calibration.problem import CalibrationProblem, Free, read_problem, Target
-from antenna_drive.calibration.report import configuration
 from antenna_drive.parameters import load, ParameterError
-from antenna_drive.parameters.files import config_dir
 from hypothesis import given, strategies as st
+from lab.calibration.problem import (
+    CalibrationProblem, Free, read_problem, SHIPPED, Target,
+)
+from lab.calibration.report import configuration
 import pytest
 import yaml
 
@@ -130,7 +131,7 @@ def test_a_name_without_end_is_not_printed_whole(tmp_path: Path, section: str) -
 
 
 def test_the_shipped_targets_are_valid() -> None:
-    problem = read_problem(config_dir() / 'calibration' / 'article.yaml')
+    problem = read_problem(SHIPPED / 'article.yaml')
     assert isinstance(problem, CalibrationProblem)
     for item, share in zip(problem.free, problem.start()):
         assert 0.0 < share < 1.0, f'{item.name} starts at a bound'

@@ -7,16 +7,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 import math
 from pathlib import Path
+import sys
 from typing import Any
 
-from antenna_drive import cli
-from antenna_drive.calibration.problem import Evaluation, Free, Target
-from antenna_drive.calibration.report import report
-from antenna_drive.calibration.search import FitCandidate, search
 from antenna_drive.parameters import load, ParameterError
+from lab import cli
+from lab.calibration.problem import Evaluation, Free, Target
+from lab.calibration.report import report
+from lab.calibration.search import FitCandidate, search
 import numpy as np
 import pytest
-from simgap.command.programs import BAD_INPUT, OK
+from simgap.command.programs import BAD_INPUT, NOT_INSTALLED, OK
 from simgap.errors import UserError
 
 pytest.importorskip('cma')
@@ -176,9 +177,21 @@ search: {population: 4, spread: 0.1}
     assert out.read_bytes() == first
 
 
-def test_a_missing_file_is_told_in_one_line(capsys: pytest.CaptureFixture[str],
-                                            tmp_path: Path) -> None:
-    assert cli.main(['calibrate', 'nowhere', '--out', str(tmp_path / 'x')]) == BAD_INPUT
+@pytest.mark.parametrize(('name', 'shown'), [('nowhere', 'nowhere'), ('a\udcff', 'a ')])
+def test_a_missing_file_is_told_in_one_line(
+        name: str, shown: str, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """The second name has a byte that is no UTF-8, which is shown as a space."""
+    assert cli.main(['calibrate', name, '--out', str(tmp_path / 'x')]) == BAD_INPUT
     error = capsys.readouterr().err
-    assert 'nowhere' in error
+    assert f'{shown}: no such file' in error
     assert error.count('\n') == 1
+
+
+def test_without_its_library_what_to_do_is_told(
+        monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setitem(sys.modules, 'cma', None)
+    for name in ('lab.calibration.search', 'lab.calibration.report', 'lab.cli.calibrate'):
+        monkeypatch.delitem(sys.modules, name, raising=False)
+    assert cli.main(['calibrate', '--help']) == NOT_INSTALLED
+    assert capsys.readouterr().err == (
+        'lab calibrate: needs cma: make set-up, or pip install cma\n')

@@ -121,6 +121,14 @@ def test_misspelt_command(fake: FakeCommand, capsys: pytest.CaptureFixture[str])
         'antenna-drive fkae: no such command, did you mean fake?\n')
 
 
+@pytest.mark.parametrize('typed', ['calibrate', 'calibrat'])
+def test_a_command_that_has_moved(typed: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """What to type now is said."""
+    assert cli.main([typed, 'article', '--out', 'x.yaml']) == BAD_INPUT
+    assert capsys.readouterr().err == (
+        f'antenna-drive {typed}: no such command, did you mean lab calibrate?\n')
+
+
 def test_exit_code_is_the_commands(fake: FakeCommand) -> None:
     """What the command returns is the exit code."""
     fake('return 1')

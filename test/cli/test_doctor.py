@@ -35,22 +35,22 @@ def test_what_is_needed_works_here(capsys: Capture) -> None:
 
 def test_a_library_that_is_missing_is_no_fault_unless_it_was_asked_for(
         monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
-    monkeypatch.setitem(sys.modules, 'cma', None)
-    assert main(['doctor', 'calibrate', '--json', '-']) == 3
+    monkeypatch.setitem(sys.modules, 'shtab', None)
+    assert main(['doctor', 'completion', '--json', '-']) == 3
     [item] = findings(capsys)
-    assert (item['state'], item['remedy']) == ('missing', 'pip install cma')
-    monkeypatch.setattr(health, 'PARTS', {'calibrate': health.PARTS['calibrate']})
+    assert (item['state'], item['remedy']) == ('missing', 'pip install shtab')
+    monkeypatch.setattr(health, 'PARTS', {'completion': health.PARTS['completion']})
     monkeypatch.setattr('antenna_drive.cli.doctor.PARTS', health.PARTS)
     assert main(['doctor']) == 0
-    assert 'pip install cma' in capsys.readouterr().out
+    assert 'pip install shtab' in capsys.readouterr().out
 
 
 def test_a_library_that_does_not_load_is_a_fault(
         tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
-    (tmp_path / 'cma.py').write_text("raise ImportError('libx.so: no such file')")
+    (tmp_path / 'shtab.py').write_text("raise ImportError('libx.so: no such file')")
     monkeypatch.syspath_prepend(str(tmp_path))
-    monkeypatch.delitem(sys.modules, 'cma', raising=False)
-    assert main(['doctor', 'calibrate', '--json', '-']) == 1
+    monkeypatch.delitem(sys.modules, 'shtab', raising=False)
+    assert main(['doctor', 'completion', '--json', '-']) == 1
     [item] = findings(capsys)
     assert item['state'] == 'broken'
     assert 'libx.so: no such file' in item['found']

@@ -52,8 +52,8 @@ np.savetxt(sys.argv[2], np.column_stack([time, rows["turn"], angle, np.gradient(
 SERVERS = {'antenna-drive live': 'http://', 'ros2 run': 'ready; waits for'}
 # What starts a whole drive runs beside no other test that does.
 DRIVES = ('antenna-drive live', 'antenna-drive record', 'antenna-drive article --through-nodes')
-TRIALS = ('antenna-drive calibrate', 'antenna-drive investigate', 'simgap investigate',
-          'antenna-drive confusability', 'antenna-drive diagnose-many', 'simgap propose',
+TRIALS = ('antenna-drive investigate', 'simgap investigate', 'antenna-drive confusability',
+          'antenna-drive diagnose-many', 'simgap propose',
           'antenna-drive article --figures', 'antenna-drive article --through-nodes',
           'antenna-drive propose', 'antenna-drive predict', 'antenna-drive diagnose',
           'simgap diagnose')

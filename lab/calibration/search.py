@@ -18,9 +18,9 @@ import math
 from pathlib import Path
 from typing import Any, TextIO
 
-from antenna_drive.calibration.problem import CalibrationProblem, Evaluation
 from antenna_drive.workers import workers
 import cma
+from lab.calibration.problem import CalibrationProblem, Evaluation
 import numpy as np
 from simgap.errors import UserError
 

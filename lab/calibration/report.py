@@ -13,11 +13,11 @@ from itertools import count
 import math
 from typing import Any
 
-from antenna_drive.calibration.problem import CalibrationProblem
-from antenna_drive.calibration.search import FitCandidate, SearchResult
 from antenna_drive.emulator.unit import FloatArray
 from antenna_drive.parameters.loading import find
 from antenna_drive.yaml_text import dump_yaml
+from lab.calibration.problem import CalibrationProblem
+from lab.calibration.search import FitCandidate, SearchResult
 import numpy as np
 from simgap.inputs.plain_yaml import read_yaml
 from simgap.inputs.schema import nearest, ParameterError

@@ -3,8 +3,8 @@
 """
 Fit parameters to published or measured figures, and report how well these determine them.
 
-  antenna-drive calibrate article --out fitted.yaml
-  antenna-drive calibrate my_antenna.yaml --start my_drive.yaml --out fitted.yaml --log fit.log
+  lab calibrate article --out fitted.yaml
+  lab calibrate my_antenna.yaml --start my_drive.yaml --out fitted.yaml --log fit.log
 
 TARGETS lists the free parameters with their bounds, and the target figures with tolerances
 and weights; docs/calibration.md describes its form. The search is global and repeatable: the
@@ -16,11 +16,10 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from antenna_drive.calibration.problem import read_problem
-from antenna_drive.calibration.report import configuration, report
-from antenna_drive.calibration.search import search
 from antenna_drive.cli.options import add_worker_options
-from antenna_drive.parameters.files import config_dir
+from lab.calibration.problem import read_problem, SHIPPED
+from lab.calibration.report import configuration, report
+from lab.calibration.search import search
 from simgap.command.output import add_json_option, check_options, give, Progress, replaced
 from simgap.command.programs import NEGATIVE, OK
 from simgap.inputs.schema import Entry
@@ -31,7 +30,7 @@ COUNT = 2000
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('targets', metavar='TARGETS',
                         help='free parameters and target figures: a file, or a name in '
-                             'config/calibration/')
+                             'lab/calibration/')
     parser.add_argument('--start', metavar='CONFIG', default='reference',
                         help='configuration to start from (default: %(default)s)')
     parser.add_argument('--out', metavar='FILE', type=Path, required=True,
@@ -50,7 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     check_options(arguments, jobs=Entry('', 1, whole=True))
-    shipped = config_dir() / 'calibration' / f'{arguments.targets}.yaml'
+    shipped = SHIPPED / f'{arguments.targets}.yaml'
     by_name = shipped.is_file() and not Path(arguments.targets).exists()
     problem = read_problem(shipped if by_name else arguments.targets, [arguments.start])
     with Progress('candidates', max(1, arguments.count)) as shown:

@@ -32,6 +32,8 @@ from simgap.errors import one_line
 from simgap.inputs.plain_yaml import read_yaml
 from simgap.inputs.schema import Entry, mapping_of, nearest, quoted
 
+# Target files that `lab calibrate` knows by name.
+SHIPPED = Path(__file__).parent
 # The circuit of an experiment that uses the configuration's own.
 NO_CIRCUIT = 'none'
 KINDS = ('value', 'at_least', 'at_most')
