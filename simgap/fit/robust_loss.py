@@ -31,4 +31,5 @@ def robust_losses(residual: FloatArray, outlier: float) -> FloatArray:
     # after a contact that is made too late everything differs for a while
     size = np.abs(residual)
     large = np.maximum(size, outlier)
-    return np.where(size < outlier, 0.5 * size ** 2, outlier ** 2 * (0.5 + np.log(large / outlier)))
+    return np.where(size < outlier, 0.5 * size ** 2,
+                    outlier ** 2 * (0.5 + np.log(large / outlier)))

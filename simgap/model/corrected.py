@@ -37,7 +37,7 @@ _INERTIAL = 'mass diaginertia fullinertia value ixx ixy ixz iyy iyz izz'.split()
 _SAME = 1e-3  # share by which a number has to change to be written
 
 
-class Found(NamedTuple):
+class Corrections(NamedTuple):
     """What was found of a joint: each number by its name in `_SAID`, or by its place."""
 
     joint: str
@@ -57,7 +57,7 @@ def source_of(model: Path, target: Path) -> tuple[Path, str]:
     return path, str(source['joint'])
 
 
-def found_of(verdict: Verdict, joint: str) -> Found:
+def found_of(verdict: Verdict, joint: str) -> Corrections:
     """Return what the best answer of a verdict says of the joint, in its first test."""
     machine = without_labels(verdict.machine)
     assert isinstance(machine, OwnMachine)
@@ -74,12 +74,12 @@ def found_of(verdict: Verdict, joint: str) -> Found:
                     | {'delay' if item.act == 'delays' else f'{item.act} {item.target}':
                        item.factor * numbers[item.number] for item in simulate.actions
                        if item.is_of({**simulate.inputs, **simulate.readings})})
-    return Found(joint, simulate.longest_step_s, told[0], told[1], {
+    return Corrections(joint, simulate.longest_step_s, told[0], told[1], {
         name: value for name, value in told[1].items()
         if abs(value - told[0][name]) > _SAME * abs(told[0][name])})
 
 
-def corrected(source: Path, found: Found) -> tuple[bytes, list[tuple[str, float, float, str]]]:
+def corrected(source: Path, found: Corrections) -> tuple[bytes, list[tuple[str, float, float, str]]]:
     """
     Return a file with what was found, and of each number name, before, now, and where it is.
 
@@ -95,7 +95,7 @@ def corrected(source: Path, found: Found) -> tuple[bytes, list[tuple[str, float,
                    said.get(name, '')) for name, value in found.changed.items()]
 
 
-def _mjcf(source: Path, found: Found) -> tuple[bytes, dict[str, str]]:
+def _mjcf(source: Path, found: Corrections) -> tuple[bytes, dict[str, str]]:
     """Return an MJCF with what was found, and where each number is."""
     text, model, now = XmlText(source.read_bytes()), robot(source), dict(found.changed)
     joint = text.root.find('joint', name=found.joint)[0]
@@ -133,10 +133,11 @@ def _servo(tag: str, value: Mapping[str, str],
 
 
 def _insert_twist(text: XmlText, joint: Element, model: Any, value: Mapping[str, str],
-                  found: Found) -> None:
+                  found: Corrections) -> None:
     """Insert the twist behind the motor, and change whatever else has to follow."""
     own = model.joint(found.joint)
-    words = {**value, 'joint': found.joint, 'axis': text_of(own.axis), 'pos': text_of(own.pos),
+    words = {**value, 'joint': found.joint, 'line': text_of(model.jnt_axis[own.id]),
+             'pos': text_of(own.pos),
              'gap': text_of(found.now['half_gap'] * np.array([-1.0, 1.0]) + 0.0)}
     text.insert(TWIST.substitute(words), joint)
     text.insert(TEETH.substitute(words), text.root.children[-1])
@@ -151,7 +152,7 @@ def _insert_twist(text: XmlText, joint: Element, model: Any, value: Mapping[str,
         text.insert(f'<option timestep="{step}"/>', text.root.children[-1])
 
 
-def _scale(text: XmlText, links: list[Element], found: Found) -> dict[str, str]:
+def _scale(text: XmlText, links: list[Element], found: Corrections) -> dict[str, str]:
     """Scale mass and inertia of links or bodies, unless one has them from its shapes alone."""
     own = {link: [item for item in link.children if item.tag == 'inertial'] for link in links}
     if 'load' not in found.changed or any(not own[link] and link.find('geom') for link in links):
@@ -165,7 +166,7 @@ def _scale(text: XmlText, links: list[Element], found: Found) -> dict[str, str]:
     return {'load': f'inertial of {len(links)} links'}
 
 
-def _urdf(source: Path, found: Found) -> tuple[bytes, dict[str, str]]:
+def _urdf(source: Path, found: Corrections) -> tuple[bytes, dict[str, str]]:
     """Return a URDF with what was found, and where each number is."""
     text, said = XmlText(source.read_bytes()), dict[str, str]()
     joint = text.root.find('joint', name=found.joint)[0]

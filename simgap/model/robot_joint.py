@@ -26,7 +26,7 @@ from simgap.model.declared import ModelError
 # Dry friction that stops within a few steps: MuJoCo's own is so soft that a joint creeps.
 DRY = {'solreffriction': '0.002 1', 'solimpfriction': '0.999 0.999 1'}
 # The twist: a joint behind that of the motor, in one body with it, and the tendon that holds it.
-TWIST = Template('<joint name="${joint}_twist" type="hinge" axis="$axis" pos="$pos" armature="0" '
+TWIST = Template('<joint name="${joint}_twist" type="hinge" axis="$line" pos="$pos" armature="0" '
                  'damping="$loss" frictionloss="0" stiffness="0" limited="false"/>')
 TEETH = Template('<tendon><fixed name="${joint}_teeth" stiffness="$stiffness" '
                  'springlength="$gap"><joint joint="${joint}_twist" coef="1"/></fixed></tendon>')
@@ -128,18 +128,18 @@ def _body(model: mujoco.MjModel, data: mujoco.MjData, number: int,
     mujoco.mj_mulM(model, data, column, np.eye(model.nv)[freedom])
     armature, coulomb, viscous = (float(values[freedom]) for values in (
         model.dof_armature, model.dof_frictionloss, model.dof_damping))
-    axis, mass, gravity = data.xaxis[number], model.body_subtreemass[body], model.opt.gravity
+    line, mass, gravity = data.xaxis[number], model.body_subtreemass[body], model.opt.gravity
     arm = data.subtree_com[body] - data.xanchor[number]
-    arm = arm - axis * (axis @ arm)  # what lies along the joint's line moves nothing
+    arm = arm - line * (line @ arm)  # what lies along the joint's line moves nothing
     moved, known = float(column[freedom]) - armature, rotor or armature
     rotor = known or _ROTOR * moved
     both = rotor * moved / (rotor + moved)
     step = min(float(model.opt.timestep), _STEP)
     stiffness = both * (_STIFF / step) ** 2
     loss = 2.0 * _LOSS * math.sqrt(stiffness * both)
-    pull = float(mass * np.linalg.norm(np.cross(arm, gravity - axis * (axis @ gravity))))
+    pull = float(mass * np.linalg.norm(np.cross(arm, gravity - line * (line @ gravity))))
     return {
-        'axis': axis, 'pos': np.zeros(3), 'centre': arm, 'mass': mass, 'pull': pull,
+        'line': line, 'pos': np.zeros(3), 'centre': arm, 'mass': mass, 'pull': pull,
         'inertia': max(moved - mass * float(arm @ arm), 1e-9), 'rotor': rotor, 'moved': moved,
         'rotor_share': 0.2 if known else 0.9,
         'rotor_known': 'as told' if known else 'guessed: give --rotor',

@@ -18,10 +18,10 @@ does not turn with its bounds; a shape has an even one within them. T is by how 
 a sample counts, because residuals are loud or correlated. Each effect has to gain, for itself,
 what shows an effect beside all that a model leaves out.
 
-No form of an effect is exact, and no model. What effects gain in a signal counts down to the share
-that an error of form leaves there, so that a further effect is not paid for by what the form of
-another one lacks, and may be small in signals that the other one does not move. Each effect also
-has to gain the share of the noise that an error of the model may be.
+No form of an effect is exact, and no model. What is gained in a signal below the share that an
+error of form leaves there hardly counts: the form of another effect may lack it. So an effect may
+be small in signals that another one does not move. Each effect also has to gain the share of the
+noise that an error of the model may be.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class Evidence:
     temperature: float  # by how much less than one a sample counts
     gain: float  # of the best over none [half chi-square]
     scale: float = 1.0  # of the noise, where the misfit counts as such
-    # the cost of a residual by signal, and the least that counts, shape (c,) [half chi-square]
+    # cost of a residual by signal, and the least that an error of form leaves, shape (c,)
     by_signal: Callable[[FloatArray], FloatArray] = lambda residual: np.zeros(1)
     least: FloatArray = field(default_factory=lambda: np.zeros(1))
 
@@ -73,8 +73,9 @@ class Evidence:
         # what the nuisances have is that of all hypotheses, and their derivatives err
         occam = 0.5 * float(np.linalg.slogdet(scaled)[1]
                             - np.linalg.slogdet(scaled[np.ix_(shared, shared)])[1])
-        cost = state.cost + float(np.maximum(
-            self.least - self.by_signal(state.residual), 0.0).sum())
+        # what an error of form may be hardly counts, but still tells two places apart
+        below = float(np.maximum(self.least - self.by_signal(state.residual), 0.0).sum())
+        cost = state.cost + (1.0 - self.settings.form_error ** 2) * below
         return float(-self.price(hypothesis.forms) - cost / self.temperature - occam)
 
     def _precision(self, state: FitState) -> FloatArray:

@@ -111,7 +111,7 @@ class InputEvidence:
 
     def weighed(self, square: FloatArray, slope: FloatArray, size: float) -> Weighed:
         """Return independent inputs, given their normal equations and the size of these."""
-        values, vectors = np.linalg.eigh(0.5 * (square + square.T) / size)
+        values, vectors = _eigen(0.5 * (square + square.T) / size)
         stiff = np.maximum(values, 0.0)[:, np.newaxis] + 1.0 / _RATIOS
         turned = vectors.T @ slope
         along = np.sum((turned ** 2)[:, np.newaxis] / stiff, axis=0) / size
@@ -147,6 +147,15 @@ class InputEvidence:
         left = float(np.clip(1.0 - factors @ products[1:] / products[0], 1e-9, 1.0))
         evidence = -0.5 * (count * math.log(left) + _LAGS * math.log(count))
         return max(evidence, 0.0), 1.0 - left
+
+
+def _eigen(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return eigenvalues and eigenvectors of a symmetric matrix."""
+    try:
+        values, vectors = np.linalg.eigh(matrix)
+    except np.linalg.LinAlgError:  # the quick method does not always converge
+        values, vectors = linalg.eigh(matrix, driver='evr')
+    return values, vectors
 
 
 def _rows(roots: Sequence[FloatArray], matrix: FloatArray) -> FloatArray:

@@ -43,7 +43,7 @@ class Law:
     deviations: tuple[float, ...]  # standard deviations of these values
     by_unit: str  # of the quantity
     unit: str  # of the values
-    # share of what is left of each test that the law takes, fitted to the others; None for one test
+    # share of what is left of each test that it takes, fitted to the others; None for one test
     withheld: float | None = None
 
     def __str__(self) -> str:

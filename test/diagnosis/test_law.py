@@ -73,7 +73,7 @@ def test_a_law_that_noise_could_pass_for_is_no_noise() -> None:
 @pytest.mark.parametrize('sign, low, high', [(1.0, 0.7, 1.0), (-1.0, -10.0, 0.0)])
 def test_a_law_is_tried_on_each_test_after_the_others(sign: float, low: float,
                                                       high: float) -> None:
-    """A spring takes nearly all off a test that it was not fitted to, one of other sign nothing."""
+    """A spring takes nearly all off the other test, one of other sign nothing."""
     machine = Turning(2.0 * ANGLE, NOTHING)
     other = Turning(2.0 * sign * ANGLE, NOTHING)
     two = machine.with_experiments([*machine.experiments, replace(

@@ -155,8 +155,8 @@ def test_unknown_says_place_size_and_when_and_what_would_settle_it() -> None:
         'angle (reversal). The model misses angle by 0.0432 rad rms. As force on the carriage it '
         'could explain 83 percent of the gap, best as a function of angle, in proportion to load. '
         'It goes from 0.5 N/A at 0 rad to -2 N/A at 2 rad, most like a parabola, which lacks less '
-        'than 0.1 percent of it; fitted to the other recordings it takes 40 percent off what is left of '
-        'one.')
+        'than 0.1 percent of it; fitted to the other recordings it takes 40 percent off what is '
+        'left of one.')
     assert 'one test is not enough' in found.then and '`propose`' in found.then
 
 

@@ -34,9 +34,9 @@ def fitted(cost: float, *effects: str, within: str = '') -> Hypothesis:
     forms = tuple(Form('', (replace(
         NUMBER, name=f'{effect}.size', tolerance=2.0 if effect == within else NUMBER.tolerance),))
         for effect in effects)
-    blank = np.zeros(0)
+    blank, alone = np.zeros(0), np.array([cost])
     return Hypothesis(effects, forms, FitState(
-        tuple(form.parameters[0] for form in forms), np.ones(len(effects)), blank,
+        tuple(form.parameters[0] for form in forms), np.ones(len(effects)), alone,
         np.zeros((0, 0), np.float32), blank, cost, kept_hessian=1e4 * np.eye(len(effects))))
 
 
@@ -53,11 +53,15 @@ class Nothing(Machine):
         return np.zeros((1, 1))
 
 
-def found(*hypotheses: Hypothesis, tempered: float = 1.0) -> Found:
-    """Return what a search would have found with these fits."""
+def found(*hypotheses: Hypothesis, tempered: float = 1.0, share: float = 0.0) -> Found:
+    """Return what a search would have found with these fits; an error of form leaves a share."""
     none = next(h.cost for h in hypotheses if not h.effects)
     single = min((h.cost for h in hypotheses if len(h.effects) == 1), default=none)
-    evidence = Evidence(DEFAULT.evidence, 1000, tempered, max(none - single, 0.0))
+    # the one signal of a fit has its whole cost
+    end = min(h.cost for h in hypotheses)
+    evidence = Evidence(
+        DEFAULT.evidence, 1000, tempered, max(none - single, 0.0), by_signal=lambda cost: cost,
+        least=np.array([end + share * (none - end)]))
     return Found(LeastSquares(Nothing()), evidence.ranked(hypotheses), evidence)
 
 
@@ -100,8 +104,10 @@ def test_a_partner_has_to_explain_a_share_of_what_the_first_effect_does() -> Non
     little, much = (fitted(2000.0 - gain * leaves, 'axis.inertia', 'motor.gain')
                     for gain in (0.9, 1.3))
     for tempered in (1.0, 4.0):
-        assert ranked(found(none, single, little, tempered=tempered), 0.0)[0].hypothesis is single
-        assert ranked(found(none, single, much, tempered=tempered), 0.0)[0].hypothesis is much
+        for pair, first in ((little, single), (much, much)):
+            searched = found(none, single, pair, tempered=tempered,
+                             share=DEFAULT.evidence.form_error ** 2)
+            assert ranked(searched, 0.0)[0].hypothesis is first
 
 
 def test_an_effect_within_its_tolerance_is_not_named() -> None:
@@ -163,7 +169,7 @@ def test_the_same_effects_in_another_order_are_the_same_answer() -> None:
 def test_a_small_partner_is_listed_apart() -> None:
     none, single = fitted(20000.0), fitted(1000.0, 'axis.inertia')
     pair = fitted(800.0, 'axis.inertia', 'motor.gain')
-    searched = found(none, single, pair, tempered=4.0)
+    searched = found(none, single, pair, tempered=4.0, share=DEFAULT.evidence.form_error ** 2)
     assert ranked(searched, 0.0)[0].effects == ('axis.inertia',)
     [seen] = also_seen(searched)
     assert seen == {'effect': 'motor.gain', 'gain': 50.0,
