@@ -79,7 +79,8 @@ def found_of(verdict: Verdict, joint: str) -> Corrections:
         if abs(value - told[0][name]) > _SAME * abs(told[0][name])})
 
 
-def corrected(source: Path, found: Corrections) -> tuple[bytes, list[tuple[str, float, float, str]]]:
+def corrected(source: Path, found: Corrections,
+              ) -> tuple[bytes, list[tuple[str, float, float, str]]]:
     """
     Return a file with what was found, and of each number name, before, now, and where it is.
 
