@@ -25,7 +25,7 @@ class Quantity:
     """Something that a machine does: its unit, and its values in each test."""
 
     unit: str
-    values: Sequence[FloatArray]
+    values: list[FloatArray]
 
 
 Quantities = Mapping[str, Quantity]
@@ -59,15 +59,14 @@ class Law:
 def quantities_of(problem: LeastSquares, point: Mapping[str, float]) -> Quantities:
     """Return what the machine does, by name, at the samples of each test."""
     found: dict[str, Quantity] = {}
-    values: dict[str, list[FloatArray]] = {}
     for k, experiment in enumerate(problem.experiments):
         motion, predicted = problem.machine.motion(k), problem.machine.predict(point, k).T
-        for name, own in motion.covariates().items():
-            found[name] = Quantity(motion.unit(name), values.setdefault(name, []))
-            values[name].append(np.asarray(own))
-        for name, unit, own in zip(experiment.channels, experiment.units, predicted, strict=True):
-            found[name] = Quantity(unit, values.setdefault(name, []))
-            values[name].append(np.asarray(own))
+        # a reading counts, where the motion has a quantity of its name
+        seen = {name: (motion.unit(name), own) for name, own in motion.covariates().items()}
+        seen |= {name: (unit, own) for name, unit, own in zip(
+            experiment.channels, experiment.units, predicted, strict=True)}
+        for name, (unit, own) in seen.items():
+            found.setdefault(name, Quantity(unit, [])).values.append(np.asarray(own))
     return {name: item for name, item in found.items()
             if len(item.values) == len(problem.experiments)
             and np.ptp(np.concatenate(item.values)) > 0.0}
@@ -82,7 +81,7 @@ def likeliest(evidence: InputEvidence, square: FloatArray, slope: FloatArray,
     the law's k values, shape (m, k).
     """
     best = None
-    factors = {'': Quantity('', ()), **{
+    factors = {'': Quantity('', []), **{
         name: quantities[name] for name in _FACTORS if name in quantities}}
     for times, factor in factors.items():
         weight = np.concatenate(factor.values)[:, np.newaxis] if times else 1.0

@@ -10,11 +10,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from simgap.fit.least_squares import LeastSquares
-from simgap.machine.contract import DisturbanceInput, FloatArray, Motion
+from simgap.machine.contract import DisturbanceInput, FloatArray, Motion, Point
 from simgap.settings import DEFAULT
 from simgap.verdict.diagnosis import diagnose
 from simgap.verdict.input_evidence import InputEvidence
-from simgap.verdict.law import cross_validated, Law
+from simgap.verdict.law import cross_validated, Law, quantities_of
 from simgap.verdict.law_form import nearest_form
 from simgap.verdict.unknown_input import places
 from two_lags import answered, TIME, TwoLags
@@ -31,6 +31,14 @@ class Turning(TwoLags):
     def motion(self, experiment: int) -> Motion:
         """Return how it turns."""
         return Motion(TIME, rate=RATE, angle=ANGLE, load=LOAD, units={'angle': 'rad'})
+
+
+class Read(Turning):
+    """The same, whose readings are its angle and its rate, in other units."""
+
+    def predict(self, point: Point, experiment: int) -> FloatArray:
+        """Return both readings."""
+        return np.column_stack([ANGLE + 1.0, 2.0 * RATE])
 
 
 def likeliest(left: FloatArray) -> tuple[str, Law]:
@@ -99,6 +107,16 @@ def test_a_law_has_the_units_of_its_place_and_deviations_that_hold() -> None:
     off -= off.mean()
     assert np.mean(np.abs(off) < 2.0 * np.array(law.deviations) + 30.0) > 0.8
     assert nearest_form(law)[0] == 'a straight line' or nearest_form(law)[1] < 0.05
+
+
+def test_a_reading_that_has_the_name_of_a_quantity_is_that_quantity() -> None:
+    machine = Read(NOTHING, NOTHING)
+    found = quantities_of(LeastSquares(machine.with_experiments([
+        replace(e, name=name, channels=('angle', 'rate'))
+        for e in machine.experiments for name in 'ab'])), {})
+    assert [*map(len, (found['angle'].values, found['rate'].values))] == [2, 2]
+    assert (found['angle'].unit, found['load'].unit) == ('m', '')
+    np.testing.assert_array_equal(found['rate'].values[1], 2.0 * RATE)
 
 
 @pytest.mark.parametrize('shape, form', [
