@@ -72,8 +72,7 @@ def found_of(verdict: Verdict, joint: str) -> Corrections:
         told.append({_SAID.get(name, name): values[place] for place, name in places.items()
                      if name not in _FOLLOWS}
                     | {'delay' if item.act == 'delays' else f'{item.act} {item.target}':
-                       item.factor * numbers[item.number] for item in simulate.actions
-                       if item.is_of({**simulate.inputs, **simulate.readings})})
+                       item.factor * numbers[item.number] for item in simulate.of_signals})
     return Corrections(joint, simulate.longest_step_s, told[0], told[1], {
         name: value for name, value in told[1].items()
         if abs(value - told[0][name]) > _SAME * abs(told[0][name])})

@@ -78,7 +78,8 @@ def _model(path: Path, top: Mapping[str, Any]) -> Model:
         if entries[str(body.get('into', name))] != key:
             raise ModelError(f'{key}: into: two pushes enter at {body.get("into", name)}; leave '
                              'one out')
-    targets = {item.target: item.key for item in actions if not item.is_of({**inputs, **readings})}
+    signals = {**inputs, **readings}
+    targets = {item.target: item.key for item in actions if not item.is_of(signals)}
     ports = Ports(
         {**targets, **dict.fromkeys(starts, 'starts'), **dict.fromkeys(constants, 'constants')},
         dict.fromkeys(inputs, 'inputs'),
@@ -92,9 +93,11 @@ def _model(path: Path, top: Mapping[str, Any]) -> Model:
         if item.target not in given and math.isnan(defaults.get(item.target, 0.0)):
             raise ModelError(f'{item.key}: {item.target}: {top[program[0]]} gives it no value; '
                              'let a number set it first')
+    actions.sort(key=lambda item: _ACTS.index(item.act))
     simulate = FileSimulation(
         simulator, tuple(ports.places), _optional('step_s', top) or simulator.longest_step_s,
-        tuple(sorted(actions, key=lambda item: _ACTS.index(item.act))), inputs, starts, constants,
+        tuple(item for item in actions if not item.is_of(signals)),
+        tuple(item for item in actions if item.is_of(signals)), inputs, starts, constants,
         tuple(pushes), {name: list(ports.outputs).index(str(body.get('from', name)))
                         for name, (_, body) in readings.items()})
     return machine(
@@ -117,7 +120,8 @@ class FileSimulation:
     simulator: Simulator
     places: tuple[str, ...]
     longest_step_s: float
-    actions: tuple[_Action, ...]
+    of_places: tuple[_Action, ...]  # what is done to places, in this order
+    of_signals: tuple[_Action, ...]  # to inputs and readings likewise
     inputs: Mapping[str, str]
     starts: Mapping[str, str]
     constants: Mapping[str, str]
@@ -152,9 +156,7 @@ class FileSimulation:
 
     def acted(self, values: dict[str, float], numbers: Numbers) -> dict[str, float]:
         """Return the values of places after what numbers do to them."""
-        for item in self.actions:
-            if item.is_of({**self.inputs, **self.readings}):
-                continue
+        for item in self.of_places:
             change = item.factor * numbers[item.number]
             if item.act == 'sets':
                 values[item.target] = change
@@ -171,8 +173,8 @@ class FileSimulation:
 
     def _altered(self, name: str, course: FloatArray, numbers: Numbers) -> FloatArray:
         """Return the course of an input or reading, scaled and added to if numbers say so."""
-        for item in self.actions:
-            if item.target == name and item.is_of((name,)) and item.act != 'delays':
+        for item in self.of_signals:
+            if item.target == name and item.act != 'delays':
                 change = item.factor * numbers[item.number]
                 course = course * (1.0 + change) if item.act == 'scales' else course + change
         return course
@@ -180,7 +182,7 @@ class FileSimulation:
     def _late(self, name: str, course: FloatArray, numbers: Numbers, step: float) -> FloatArray:
         """Return the course of an input, altered and delayed if numbers say so."""
         course = self._altered(name, course, numbers)
-        delay = sum(item.factor * numbers[item.number] for item in self.actions
+        delay = sum(item.factor * numbers[item.number] for item in self.of_signals
                     if item.act == 'delays' and item.target == name)
         if delay == 0.0:
             return course
