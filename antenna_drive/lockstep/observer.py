@@ -21,7 +21,7 @@ from antenna_drive.lockstep.following import Follower, Step
 from antenna_drive.lockstep.frame import FrameLayout, new_sender
 from antenna_drive.lockstep.leaving import leave
 from antenna_drive.lockstep.readings import CHANGES_QOS
-from antenna_drive.lockstep.ros_link import FrameLink
+from antenna_drive.lockstep.ros_link import FrameLink, unserved
 from antenna_drive.lockstep.run_control import PAUSED, RunState
 from antenna_drive.lockstep.run_services import StateReader
 from antenna_drive.lockstep.serving import Serving
@@ -64,7 +64,7 @@ class Observer(Follower):
             need not be step 0 where the observer comes late; what came before belongs to a run
             that is over
         on_change : called as on_change(unit, record) with what a node says on `<unit>/changes`,
-            see `changes`; from another thread
+            see `changes`
         namespace : where the drive is, for a node of the observer's own
         nap_s : how long to let frames come before they are read [s]
         outputs : the signals of each unit
@@ -83,22 +83,11 @@ class Observer(Follower):
         # run, number and length of the step that is wanted next, and the one that was told
         self._wanted = self._told = (0, 0, 0.0)
         self.idle = False
-        self._serving: Serving | None = None
-        if on_change is not None:
-            self._listen(tuple(outputs), on_change)
+        self._on_change = on_change
+        self._changes = {} if on_change is None else {
+            unit: unserved(self.node, String, f'{unit}/changes', CHANGES_QOS) for unit in outputs}
+        self._serving = None if on_change is None else Serving(self.node)
         self._link.publish(self._own.hello(float(time.time_ns() // 1000), self._sender))
-
-    def _listen(self, units: Sequence[str], on_change: OnChange) -> None:
-        for unit in units:
-            def pass_on(message: String, unit: str = unit) -> None:
-                record = read_record(message.data)
-                if record is None:
-                    self.refused += 1
-                else:
-                    on_change(unit, record)
-
-            self.node.create_subscription(String, f'{unit}/changes', pass_on, CHANGES_QOS)
-        self._serving = Serving(self.node)
 
     @property
     def state(self) -> RunState | None:
@@ -139,6 +128,13 @@ class Observer(Follower):
             while (frame := self._link.take(unit)) is not None:
                 self.receive(unit, frame)
                 taken = True
+        # what is in force comes before the steps, and not by an executor
+        for unit, subscription in self._changes.items():
+            while (message := subscription.handle.take_message(String, False)) is not None:
+                if (record := read_record(message[0].data)) is None:
+                    self.refused += 1
+                elif self._on_change is not None:
+                    self._on_change(unit, record)
         return taken
 
     def _hand_on(self, step: Step) -> None:
