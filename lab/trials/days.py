@@ -27,7 +27,6 @@ from simgap.model import diagnose_logs, load_model, read_logs
 BY_DAY = {'coulomb': 0.04, 'viscous': 0.06, 'damping': 0.06, 'constant': 0.003}
 RUBBING, LESS = ('coulomb', 'viscous'), 0.7
 LONGEST_S = 10.0
-# Recordings that are diagnosed together.
 ALONE, HEALTHY, OTHER = ('1', '2', '3'), '1_2_3', '1_2_other'
 
 
