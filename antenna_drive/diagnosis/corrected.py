@@ -57,7 +57,7 @@ def correct(drive: Drive, records: Sequence[np.ndarray[Any, np.dtype[Any]]],
     point = hypothesis.state.point()
     owner = {p.name: effect for effect, form in hypothesis.items for p in form.parameters}
     fitted = [(p, point[p.name]) for p in hypothesis.state.parameters
-              if isinstance(p, AntennaParameter) and point[p.name] != 0.0]
+              if isinstance(p, AntennaParameter) and not p.of and point[p.name] != 0.0]
     written, recorder, missing = _written(given, fitted)
     why: dict[str, str] = {}
     for effect in hypothesis.effects:

@@ -29,6 +29,8 @@ With --machine joint, --machine axis or both, the machines are a robot joint and
 Each is diagnosed with a model of one's own (docs/own-machine.md). Their cases always have the
 imperfections of a wild one.
 
+With --days, joints and axes are recorded on three days, and diagnosed, see lab/notebook/days.md.
+
 With --scheduler, the workers of a cluster make and diagnose the cases. DIR must lie on a disk
 that they all have under the same path.
 
@@ -37,6 +39,7 @@ For example:
   lab trial --wild --cases 20 --seed 7 --out wild7 --diagnose
   lab trial --wild --cases 20 --seed 7 --out rest7 --diagnose --skip wild7.jsonl
   lab trial --machine joint --machine axis --cases 60 --seed 7 --out other7 --diagnose
+  lab trial --days --cases 30 --seed 7 --out days7
 """
 
 import argparse
@@ -47,7 +50,7 @@ import shlex
 from antenna_drive.cli.options import add_diagnosis_options, add_worker_options
 from lab.antenna.family import FAMILIES
 from lab.joints.machines import MACHINES
-from lab.trials import batch, sealing
+from lab.trials import batch, days, sealing
 from lab.trials.scored_cases import read_scored_of
 from simgap.command.output import add_json_option, check_options, Progress
 from simgap.errors import UserError
@@ -81,6 +84,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--family', choices=sorted(FAMILIES), default='a',
                         help='forms of effects, outsiders and programmes; nothing may be tuned '
                              'on b, which needs --wild (default %(default)s)')
+    parser.add_argument('--days', action='store_true',
+                        help='ask whether verdicts of several days agree; takes no other option')
     add_worker_options(parser, os.cpu_count() or 1)
     parser.add_argument('--skip', type=Path, metavar='FILE',
                         help='make and diagnose no case that this file of `lab score '
@@ -103,6 +108,11 @@ def run(arguments: argparse.Namespace) -> int:
     """Make the cases and diagnose them if requested; 1 if a diagnosis failed."""
     _check(arguments)
     folder = arguments.out
+    if arguments.days:
+        found = days.run_trial(folder, arguments.cases, arguments.seed, arguments.jobs)
+        print('\n'.join(f'{name}: {share.value:.2f} ({share.low:.2f} to {share.high:.2f}) '
+                        f'of {share.cases}' for name, share in found.items()))
+        return 0
     manifest = batch.prepare(
         folder, arguments.cases, arguments.seed,
         USUAL_TOLERANCE if arguments.tolerance is None else arguments.tolerance,

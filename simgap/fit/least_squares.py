@@ -140,15 +140,15 @@ class LeastSquares:
         sizes = [steps.get(item.name, item.step) for item in parameters]
         known = {j: column for j, item in enumerate(parameters)
                  if (column := self._linear_column(item)) is not None}
+        places = {item.name: j for j, item in enumerate(parameters)}
+        shared = {j: places[item.of] for j, item in enumerate(parameters) if item.of in places}
         for j, item in enumerate(parameters):
-            if j in known:
+            if j in known or j in shared:
                 continue
             here, step = point.get(item.name, 0.0), sizes[j]
             # a value at a bound may be off it by a rounding error
             room = step * (1.0 - 1e-9)
-            up = here + room <= item.high
-            down = here - room >= item.low
-            sides = [s for s, there in ((1.0, up), (-1.0, down)) if there]
+            sides = [s for s in (1.0, -1.0) if item.low <= here + s * room <= item.high]
             # a tread of a staircase is seen from both sides
             if not central and len(sides) == 2 and not item.least_step:
                 sides = sides[:1]
@@ -180,11 +180,17 @@ class LeastSquares:
                 jacobian[rows] += residual[rows, np.newaxis] * shares[k]
         for j, column in known.items():
             jacobian[:, j] = column
-        for j, item in enumerate(parameters):
-            greatest = float(np.abs(jacobian[:, j]).max(initial=0.0))
-            if greatest * sizes[j] < self.settings.fit.dead_column:
-                jacobian[:, j] = 0.0
+        for j, place in shared.items():
+            own = self._with_label(*parameters[j].label or ('', ''))
+            jacobian[own, j] = jacobian[own, place]
+        greatest = np.maximum(jacobian.max(axis=0, initial=0.0),
+                              -jacobian.min(axis=0, initial=0.0))
+        jacobian[:, greatest * sizes < self.settings.fit.dead_column] = 0.0
         return jacobian.astype(np.float32)
+
+    def _with_label(self, key: str, value: str) -> NDArray[np.bool_]:
+        # a deviation is added to its number in the tests of a label
+        return np.repeat([e.labels.get(key, '') == value for e in self.experiments], self.sizes)
 
     def _linear_column(self, item: Parameter) -> Jacobian | None:
         """Return the derivative by a number in which the machine is linear; None for another."""

@@ -7,10 +7,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 import math
+from typing import Any
 
 import numpy as np
 from scipy.signal import lfilter
 from simgap.fit.process_noise import without_process
+from simgap.machine.by_label import REPEAT
 from simgap.machine.contract import Colour, Experiment, FloatArray, Machine, Point
 from simgap.settings import NoiseSettings
 
@@ -110,17 +112,35 @@ def with_estimated_noise(experiments: Sequence[Experiment], residuals: Sequence[
                          settings: NoiseSettings) -> tuple[Experiment, ...]:
     """Return experiments with the noise of residuals, measured minus predicted, shape (n, c)."""
     colours: list[Colour] = []
+    repeated = _differences(experiments, residuals)
     for c, channel in enumerate(experiments[0].channels):
         zs = [r[:, c] / e.noise[:, c] for e, r in zip(experiments, residuals, strict=True)]
         there = [np.isfinite(z) for z in zs]
         if channel in experiments[0].quantised or not any(item.any() for item in there):
             colours.append(Colour())
             continue
-        limit = settings.greatest_level ** 2 + max(
-            _model_error(e, c, settings) for e in experiments)
+        most, slow = settings.greatest_level, settings.greatest_level ** 2
         interval = float(np.median(np.diff(experiments[0].time)))
-        colours.append(estimated(zs, interval, limit, settings).colour)
+        if repeated:  # noise is what differs between them and no more
+            seen = estimated([z[:, c] for z in repeated], interval, math.inf,
+                             replace(settings, greatest_level=math.inf))
+            most, slow = max(math.sqrt(seen.white), 1.0), seen.slow
+        limit = slow + max(_model_error(e, c, settings) for e in experiments)
+        colours.append(estimated(zs, interval, limit, replace(
+            settings, greatest_level=most)).colour)
     return tuple(replace(e, colours=tuple(colours)) for e in experiments)
+
+
+def _differences(experiments: Sequence[Experiment],
+                 residuals: Sequence[FloatArray]) -> list[FloatArray]:
+    """Return what repeated tests have for themselves, in stated noise, with its variance."""
+    alike: dict[Any, list[FloatArray]] = {}
+    for e, r in zip(experiments, residuals, strict=True):
+        if REPEAT in e.labels:
+            others = frozenset(item for item in e.labels.items() if item[0] != REPEAT)
+            alike.setdefault((e.time.size, others), []).append(r / e.noise)
+    return [(z - np.mean(same, axis=0)) * math.sqrt(len(same) / (len(same) - 1))
+            for same in alike.values() if len(same) > 1 for z in same]
 
 
 def found_noise(experiments: Sequence[Experiment]) -> dict[str, dict[str, float]]:

@@ -1,6 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""A machine whose effects may differ between labels of its tests."""
+"""
+A machine whose effects may differ between labels of its tests, and its numbers from day to day.
+
+A day and a specimen have deviations of their own from the machine's numbers, a repeat has none.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -18,12 +22,16 @@ from simgap.machine.nuisances import Nuisances
 # The values of a label by test; '' where a test lacks the label.
 Groups = Mapping[str, tuple[str, ...]]
 
+REPEAT, DAY, SPECIMEN = 'repeat', 'day', 'specimen'
+# Standard deviations under the values of a label, as shares of that of a number's prior.
+_SHARES = {DAY: 0.25, SPECIMEN: 1.0}
+
 
 def groups_of(experiments: Sequence[Experiment]) -> dict[str, tuple[str, ...]]:
     """Return the value of each test by label; labels that divide the tests alike count once."""
     found: dict[str, tuple[str, ...]] = {}
     seen = set()
-    for key in dict.fromkeys(key for e in experiments for key in e.labels):
+    for key in dict.fromkeys(key for e in experiments for key in e.labels if key != REPEAT):
         values = tuple(e.labels.get(key, '') for e in experiments)
         division = tuple(map(values.index, values))
         if len(set(values)) > 1 and division not in seen:
@@ -43,8 +51,20 @@ def without_labels(machine: Machine) -> Machine:
     return as_configured(machine.inner if isinstance(machine, ByLabel) else machine)
 
 
+def spread_of(number: Parameter, key: str) -> float:
+    """Return the standard deviation of a number under the values of a label; 0 for any other."""
+    usual = _SHARES.get(key, 0.0) * number.prior_sigma
+    return 0.0 if number.experiment is not None else (key == DAY and number.spread) or usual
+
+
 def _split_name(name: str, key: str, value: str) -> str:
     return f'{name}[{key}={value}]'
+
+
+def _deviation(of: Parameter, spread: float, label: tuple[str, str]) -> Parameter:
+    room = min(4.0 * spread, 0.5 * (of.high - of.low))
+    return replace(of, name=_split_name(of.name, *label), low=-room, high=room,
+                   prior_sigma=spread, label=label, of=of.name)
 
 
 class Labels:
@@ -54,17 +74,17 @@ class Labels:
         self.groups = groups
         # the form that each split form comes from, and the label; grows as forms are split
         self._whole: dict[Form, tuple[Form, str]] = {}
-        self._own = {p.name for p in nuisances}
+        self._own = {p.name: p for p in nuisances}
+        self.deviations = [
+            _deviation(p, spread, (key, value))
+            for key, values in groups.items() for p in nuisances if (spread := spread_of(p, key))
+            for value in dict.fromkeys(values)]
         self._endings = {_split_name('', key, value): (key, value)
                          for key, values in groups.items() for value in values}
 
     def whole(self, form: Form) -> tuple[Form, str]:
         """Return the form that a split form comes from, and the label; '' for any other form."""
         return self._whole.get(form, (form, ''))
-
-    def base_of(self, form: Form) -> Form:
-        """Return the form that a split form comes from; any other form itself."""
-        return self.whole(form)[0]
 
     def split(self, form: Form, key: str) -> Form:
         """Return a form with sizes of its own under each value of a label, and one shape."""
@@ -89,14 +109,17 @@ class Labels:
 
     def at(self, point: Point, labels: Mapping[str, str]) -> dict[str, float]:
         """Return a point as it is in a test with some labels, in the machine's own names."""
-        found, special = {}, {}
+        found: dict[str, float] = {}
         for name, value in point.items():
             base, label = self.parts(name)
-            if label is None:
-                found[base] = value
-            elif labels.get(label[0], '') == label[1]:
-                special[base] = value
-        return {**found, **special}
+            if label is None or labels.get(label[0], '') == label[1]:
+                found[base] = found.get(base, 0.0) + value
+        for name in {p.of for p in self.deviations}.intersection(found):
+            # a day may lead out of the tolerance, but mass and friction stay positive
+            own = self._own[name]
+            beyond = 0.45 * (own.high - own.low) if own.prior_sigma else 0.0
+            found[name] = min(max(found[name], own.low - beyond), own.high + beyond)
+        return found
 
     def in_test(self, point: Point, experiment: int) -> dict[str, float]:
         """Return a point as it is in one test, in the machine's own names."""
@@ -104,10 +127,11 @@ class Labels:
 
     def mean(self, point: Point) -> dict[str, float]:
         """Return a point with one size for all tests, the mean of those by label."""
-        parts: dict[str, list[float]] = {}
+        parts: dict[str, dict[str, list[float]]] = {}
         for name, value in point.items():
-            parts.setdefault(self.parts(name)[0], []).append(value)
-        return {name: fmean(values) for name, values in parts.items()}
+            base, label = self.parts(name)
+            parts.setdefault(base, {}).setdefault(label[0] if label else '', []).append(value)
+        return {name: sum(map(fmean, own.values())) for name, own in parts.items()}
 
 
 class _LabelledCatalogue(Catalogue):
@@ -137,7 +161,7 @@ class _LabelledNuisances(Nuisances):
     """Nuisances beside effects that may have a size under each label."""
 
     def __init__(self, inner: Nuisances, labels: Labels) -> None:
-        super().__init__(inner, inner.initial_conditions)
+        super().__init__([*inner, *labels.deviations], inner.initial_conditions)
         self._inner, self._labels = inner, labels
 
     def absorb(self, point: Point, removed: Point) -> dict[str, float]:

@@ -22,6 +22,9 @@ class Parameter:
     is_shape : True for a shape parameter, which has no meaning while its effect is absent
     tolerance : size up to which the model's number may be off without being wrong
     label : key and value of the label of the tests that it acts on; None for all
+    of : name of the number that it is added to in these tests; empty for none
+    spread : standard deviation from day to day, in `unit`; 0 for a usual share of the prior's
+    configured : what zero stands for, for people
     least_step : of the difference quotient where the prediction is a staircase; 0 for none
     """
 
@@ -37,6 +40,9 @@ class Parameter:
     tolerance: float = 0.0
     label: tuple[str, str] | None = field(default=None, kw_only=True)
     least_step: float = field(default=0.0, kw_only=True)
+    of: str = field(default='', kw_only=True)
+    spread: float = field(default=0.0, kw_only=True)
+    configured: float = field(default=0.0, kw_only=True)
 
 
 @dataclass(frozen=True)

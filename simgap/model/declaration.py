@@ -20,13 +20,14 @@ def known(value: float, unit: str = '1') -> Number:
 
 
 def within(value: float, share: float | None = None, unit: str = '1', *,
-           by: float | None = None, step: float = 0.0) -> Number:
+           by: float | None = None, step: float = 0.0, spread: float = 0.0) -> Number:
     """
     Return a number that is known within a tolerance, and is fitted within it.
 
     value, unit : as configured
     share, by : tolerance as a share of the value, or in its unit
     step : of the difference quotient; 0 for a usual one
+    spread : standard deviation from day to day, in its unit; 0 for an eighth of the tolerance
 
     Raises ModelError unless just one of `share` and `by` is given, and is above 0.
     """
@@ -36,7 +37,7 @@ def within(value: float, share: float | None = None, unit: str = '1', *,
     if not size > 0.0:
         raise ModelError(f'within({value:g}): a tolerance of {size:g} given, allowed is a number '
                          'above 0; give by= where the value is 0, or known()')
-    return Number(value, value - size, value + size, unit, step, 0.5 * size)
+    return Number(value, value - size, value + size, unit, step, 0.5 * size, spread=spread)
 
 
 def free(low: float, high: float, unit: str = '1', *, start: float | None = None,

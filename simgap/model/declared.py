@@ -39,6 +39,7 @@ class Number:
     sigma: float = 0.0  # standard deviation about the value; 0: unknown but for the bounds
     is_shape: bool = False  # means nothing while its effect is absent
     tolerance: float = 0.0  # size up to which an effect's number is usual and not worth a name
+    spread: float = 0.0  # standard deviation from day to day; 0: a quarter of sigma
 
     @property
     def is_known(self) -> bool:

@@ -86,7 +86,7 @@ def numbers_as_fitted(machine: Machine, point: Point) -> dict[str, Any]:
               for k in range(len(own.logs))]
     fitted = [own.numbers(here, k) for k, here in enumerate(points)]
     numbers: dict[str, Any] = {
-        name: {'value': fitted[0][name], 'configured': item.value, 'unit': item.unit}
+        name: {'value': own.numbers(point, 0)[name], 'configured': item.value, 'unit': item.unit}
         for name, item in model.base.items()}
     for name, item in model.per_test.items():
         for log, values in zip(own.logs, fitted, strict=True):

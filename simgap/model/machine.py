@@ -194,7 +194,8 @@ def _stride(log: Log, judged_hz: float | None) -> int:
 
 def _offset(name: str, item: Number, experiment: int | None = None) -> Parameter:
     return Parameter(name, item.unit, item.low - item.value, item.high - item.value,
-                     item.quotient_step, item.sigma, experiment, least_step=item.step)
+                     item.quotient_step, item.sigma, experiment, least_step=item.step,
+                     spread=item.spread, configured=item.value)
 
 
 def _error_of_reading(name: str, unit: str, by: float, experiment: int | None) -> Parameter:

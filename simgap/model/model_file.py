@@ -204,7 +204,7 @@ def _simulator(program: str, path: Path, ports: Ports) -> Simulator:
 
 def _number_bodies(top: Mapping[str, Any]) -> Iterator[tuple[str, str, Mapping[str, Any]]]:
     """Yield key, name and body of every number of the file."""
-    allowed = (*_KINDS, 'value', 'start', 'unit', 'step', 'tolerance', *_ACTS)
+    allowed = (*_KINDS, 'value', 'start', 'unit', 'step', 'spread', 'tolerance', *_ACTS)
     yield from _bodies('base', top, allowed)
     yield from _bodies('per_test', top, allowed)
     for key, _, item in _bodies('effects', top, _OF_EFFECT):
@@ -255,7 +255,8 @@ def _declared(key: str, body: Mapping[str, Any], defaults: Mapping[str, float]) 
     value = _value(f'{key}.value', body.get('value'), body, defaults)
     if value is None:
         raise ModelError(f'{key}: value: none is given')
-    return within(value, unit=unit, step=step, **{kind: _number(f'{key}.{kind}', body[kind])})
+    return within(value, unit=unit, step=step, **{
+        name: _number(f'{key}.{name}', body[name]) for name in (kind, 'spread') if name in body})
 
 
 def _value(key: str, given: object, body: Mapping[str, Any],

@@ -8,19 +8,19 @@ numbers are fitted once more to the diagnosed logs, by plain least squares.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import math
 
 import numpy as np
-from scipy.optimize import least_squares
+from simgap.fit.least_squares import LeastSquares
+from simgap.fit.starts import settled
 from simgap.logs.log import Log
 from simgap.machine.by_label import ByLabel, without_labels
 from simgap.machine.contract import FloatArray, Machine, Point
 from simgap.model.machine import OwnMachine
 from simgap.search.hypothesis import Hypothesis
+from simgap.settings import DEFAULT
 from simgap.verdict.record import Verdict
-
-_RUNS = 40
 
 
 @dataclass(frozen=True)
@@ -61,32 +61,11 @@ def unseen(verdict: Verdict, log: Log,
 
 def refitted(machine: Machine, hypothesis: Hypothesis) -> dict[str, float]:
     """Return the values of a hypothesis as fitted to the machine's logs by least squares."""
-    point = hypothesis.state.point()
-    numbers = [p for p in (*machine.nuisances, *(p for form in hypothesis.forms
-                                                 for p in form.parameters)) if p.name in point]
-    low, high = (np.array([getattr(p, end) for p in numbers]) for end in ('low', 'high'))
-    sigmas = np.array([p.prior_sigma or math.inf for p in numbers])
-    steps = np.array([p.step for p in numbers])
-
-    def residuals(x: FloatArray) -> FloatArray:
-        here = {p.name: float(value) for p, value in zip(numbers, x, strict=True)}
-        parts = [x / sigmas]
-        for k, experiment in enumerate(machine.experiments):
-            parts.append(np.nan_to_num((machine.predict(here, k) - experiment.measured)
-                                       / experiment.noise).ravel())
-        return np.concatenate(parts)
-
-    def slopes(x: FloatArray) -> FloatArray:
-        here = residuals(x)
-        signed = np.where(x + steps <= high, steps, -steps)
-        return np.array([(residuals(x + step) - here) / signed[i]
-                         for i, step in enumerate(np.diag(signed))]).T
-
-    inside = 1e-9 * (high - low)
-    start = np.clip([point[p.name] for p in numbers], low + inside, high - inside)
-    found = least_squares(residuals, start, slopes, bounds=(low, high), x_scale=high - low,
-                          max_nfev=_RUNS)
-    return {p.name: float(value) for p, value in zip(numbers, found.x, strict=True)}
+    plain = machine.with_experiments([replace(e, colours=(), process=None)
+                                      for e in machine.experiments])
+    problem = LeastSquares(plain, settings=DEFAULT.changed('fit.outlier', DEFAULT.fit.runaway))
+    start = problem.start(hypothesis.state.parameters, hypothesis.state.point())
+    return settled(problem, start, DEFAULT.search.rounds).point()
 
 
 def _carried(machine: OwnMachine, test: str, point: Point) -> dict[str, float]:

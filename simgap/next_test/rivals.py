@@ -4,7 +4,7 @@
 What a verdict knows of its rivals: the next test is designed from it, see `separation`.
 
 Each rival is a hypothesis with its fitted numbers and their covariance. Numbers of a single test,
-such as where it starts, are integrated out: the next test has its own.
+such as where it starts, or of a day are integrated out: the next test has its own.
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ def rivals_of(answers: Sequence[Answer], inflated: float, settings: Settings) ->
         if answer.probability < settings.verdict.least_probability:
             continue
         hypothesis, state = answer.hypothesis, answer.hypothesis.state
-        shared = [j for j, p in enumerate(state.parameters) if p.experiment is None]
+        shared = [j for j, p in enumerate(state.parameters) if p.experiment is None and not p.of]
         posterior = covariance(state, inflated, settings.interval)
         found.append(Rival(
             answer.effects, hypothesis.effects, tuple(form.name for form in hypothesis.forms),

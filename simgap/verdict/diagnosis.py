@@ -22,6 +22,7 @@ from simgap.verdict.intervals import values_with_intervals
 from simgap.verdict.interventions import interventions
 from simgap.verdict.lack_of_fit import remainders, residual_tests
 from simgap.verdict.record import Named, Verdict
+from simgap.verdict.reproducibility import reproducibility
 from simgap.verdict.unknown_input import components
 
 Progress = Callable[[float, str], None]
@@ -93,4 +94,5 @@ def _diagnose(machine: Machine, progress: Progress, threads: int, settings: Sett
               for h in found.found.hypotheses],
         planning=planning, seconds=time.monotonic() - began,
         notes=machine.notes, labels=labels,
-        machine=problem.machine, none=none, best=best)
+        machine=problem.machine, none=none, best=best,
+        reproducibility=reproducibility(problem, best))

@@ -53,21 +53,27 @@ def _inflation(problem: LeastSquares, state: FitState, posterior: FloatArray) ->
 
 def covariance(state: FitState, inflated: float, settings: IntervalSettings) -> FloatArray:
     """Return the covariance of converged values, shape (m, m); `inflated` is of the variance."""
-    return _covariance(state, _known(state, settings) / inflated)
+    return inverse(known_hessian(state, settings) / inflated, proper_precision(state.parameters))
 
 
-def _covariance(state: FitState, known: FloatArray) -> FloatArray:
-    total = known + np.diag(proper_precision(state.parameters))
+def inverse(known: FloatArray, precision: FloatArray) -> FloatArray:
+    """Return the covariance by what data, shape (m, m), and priors, shape (m,), determine."""
+    total = known + np.diag(precision)
     unit = np.sqrt(np.diag(total))
     return np.asarray(np.linalg.inv(total / np.outer(unit, unit)) / np.outer(unit, unit))
 
 
-def _known(state: FitState, settings: IntervalSettings) -> FloatArray:
+def known_hessian(state: FitState, settings: IntervalSettings) -> FloatArray:
     """Return the Hessian without the directions that derivatives do not determine."""
     scale = np.sqrt(np.maximum(np.diag(state.hessian), 1e-30))
     values, vectors = np.linalg.eigh(state.hessian / np.outer(scale, scale))
     sure = np.maximum(values - settings.derivative_error ** 2, 0.0)
     return np.asarray(np.outer(scale, scale) * ((vectors * sure) @ vectors.T))
+
+
+def ci95(value: float, deviation: float) -> list[float]:
+    """Return the interval of 95 percent."""
+    return [value - TWO_SIDED_95 * deviation, value + TWO_SIDED_95 * deviation]
 
 
 def jackknife(values: Sequence[float]) -> float:
@@ -82,11 +88,12 @@ def deviations(hypothesis: Hypothesis, inflated: Callable[[str], float],
     """Return robust standard deviations of the effects of a converged hypothesis, by name."""
     state = hypothesis.state
     names = [p.name for p in state.parameters]
-    known = _known(state, settings.interval)
+    known = known_hessian(state, settings.interval)
+    prior = proper_precision(state.parameters)
     found = {}
     for parameter, value in hypothesis.values:
         place = names.index(parameter.name)
-        variance = _covariance(state, known / inflated(parameter.name))[place, place]
+        variance = inverse(known / inflated(parameter.name), prior)[place, place]
         found[parameter.name] = math.hypot(
             max(float(variance) ** 0.5, between_tests.get(parameter.name, 0.0)),
             _same_number(parameter, value), settings.noise.model_error * value)
@@ -96,9 +103,8 @@ def deviations(hypothesis: Hypothesis, inflated: Callable[[str], float],
 def values_with_intervals(hypothesis: Hypothesis,
                           deviating: Mapping[str, float]) -> dict[str, Any]:
     """Return a hypothesis' effect values with 95 percent intervals, for the JSON."""
-    return {p.name: {'value': value, 'unit': p.unit, 'ci95': [
-        max(value - TWO_SIDED_95 * deviating[p.name], p.low),
-        min(value + TWO_SIDED_95 * deviating[p.name], p.high)]} for p, value in hypothesis.values}
+    return {p.name: {'value': value, 'unit': p.unit, 'ci95': np.clip(
+        ci95(value, deviating[p.name]), p.low, p.high).tolist()} for p, value in hypothesis.values}
 
 
 def _same_number(parameter: Parameter, value: float) -> float:

@@ -15,7 +15,7 @@ from simgap.machine.contract import FloatArray, Form, Parameter
 from simgap.search.hypothesis import Hypothesis
 from simgap.search.search import Found
 from simgap.verdict.held_out import held_out
-from simgap.verdict.intervals import contrast_deviation, TWO_SIDED_95
+from simgap.verdict.intervals import ci95, contrast_deviation
 
 _ROUNDS = 2
 
@@ -39,16 +39,13 @@ def simplified(found: Found) -> Found:
     whole = best.with_jacobian(problem)
     forms = []
     for form in best.forms:
-        base, own = machine.labels.base_of(form), [p.label for p in form.sizes if p.label]
+        base, own = machine.labels.whole(form)[0], [p.label for p in form.sizes if p.label]
         values = [value for _, value in dict.fromkeys(own)]
         differs = any(_compared(
             problem, whole.state, size, [_of_value(form, own[0][0], value)[j] for value in values],
             values)['differs'] for j, size in enumerate(base.sizes)) if own else True
         forms.append(form if differs else base)
-    if tuple(forms) == best.forms:
-        return found
-    point = {**machine.labels.mean(best.state.point()), **best.state.point()}
-    simpler = Hypothesis(best.effects, tuple(forms), _fitted(problem, best, forms, point))
+    simpler = _in_forms(problem, machine, best, forms)
     return replace(found, hypotheses=[simpler, *found.hypotheses[1:]])
 
 
@@ -56,7 +53,8 @@ def _of_label(problem: LeastSquares, machine: ByLabel, none: Hypothesis, best: H
               key: str, threads: int) -> dict[str, Any]:
     groups = machine.labels.groups[key]
     numbers = _numbers(problem, machine, best, key) if best.effects else []
-    common = _in_common(problem, machine, best)
+    common = _in_forms(problem, machine, best,
+                       [machine.labels.whole(form)[0] for form in best.forms])
     reach = held_out(problem, none, common, threads, groups,
                      f'each value of {key} in turn, with the effect as the others have it; '
                      'offsets within the tolerance were fitted to it, with the effect and without')
@@ -78,7 +76,7 @@ def _effects(numbers: Sequence[Mapping[str, Any]], differ: bool) -> list[str]:
 
 def _numbers(problem: LeastSquares, machine: ByLabel, best: Hypothesis,
              key: str) -> list[dict[str, Any]]:
-    bases = {effect: machine.labels.base_of(form) for effect, form in best.items}
+    bases = {effect: machine.labels.whole(form)[0] for effect, form in best.items}
     chosen = {effect: machine.labels.split(form, key) for effect, form in bases.items()
               if can_be_split(form)}
     groups = machine.labels.groups[key]
@@ -103,12 +101,12 @@ def _of_value(form: Form, key: str, value: str) -> list[Parameter]:
     return [p for p in form.sizes if p.label == (key, value)]
 
 
-def _in_common(problem: LeastSquares, machine: ByLabel, best: Hypothesis) -> Hypothesis:
-    forms = tuple(machine.labels.base_of(form) for form in best.forms)
-    if forms == best.forms:
+def _in_forms(problem: LeastSquares, machine: ByLabel, best: Hypothesis,
+              forms: Sequence[Form]) -> Hypothesis:
+    if tuple(forms) == best.forms:
         return best
-    return Hypothesis(best.effects, forms, _fitted(
-        problem, best, forms, machine.labels.mean(best.state.point())))
+    point = {**machine.labels.mean(best.state.point()), **best.state.point()}
+    return Hypothesis(best.effects, tuple(forms), _fitted(problem, best, forms, point))
 
 
 def _fitted(problem: LeastSquares, best: Hypothesis, forms: Sequence[Form],
@@ -141,20 +139,16 @@ def _compared(problem: LeastSquares, state: FitState, base: Parameter,
     by_value = {}
     for name, contrast in zip(values, contrasts, strict=True):
         value, deviation = estimated(contrast)
-        low, high = _interval(value, deviation)
-        by_value[name] = {'value': value, 'ci95': [max(low, base.low), min(high, base.high)]}
+        by_value[name] = {'value': value, 'ci95': np.clip(
+            ci95(value, deviation), base.low, base.high).tolist()}
     differences = []
     for name, contrast in zip(values[1:], contrasts[1:], strict=True):
         value, deviation = estimated(contrast - contrasts[0])
         differences.append({
-            'from': values[0], 'to': name, 'value': value, 'ci95': _interval(value, deviation),
+            'from': values[0], 'to': name, 'value': value, 'ci95': ci95(value, deviation),
             'differs': abs(value) > max(worth * deviation, base.tolerance)})
     return {'values': by_value, 'differences': differences,
             'differs': any(item['differs'] for item in differences)}
-
-
-def _interval(value: float, deviation: float) -> list[float]:
-    return [value - TWO_SIDED_95 * deviation, value + TWO_SIDED_95 * deviation]
 
 
 def lines(labels: Sequence[Mapping[str, Any]]) -> list[str]:

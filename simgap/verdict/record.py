@@ -3,7 +3,7 @@
 """What a diagnosis says: a record for programs, with a few lines for people and the JSON."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, field, fields
 from typing import Any
 
 from simgap.inputs.plain import strict_json
@@ -11,6 +11,7 @@ from simgap.machine.contract import Machine
 from simgap.search.hypothesis import Hypothesis
 from simgap.verdict.interventions import lines as lines_of_labels
 from simgap.verdict.localisation import Located
+from simgap.verdict.reproducibility import lines as lines_of_days
 from simgap.verdict.sentence import beyond, headline, loud, said
 from simgap.verdict.unknown_input import Place
 
@@ -54,6 +55,8 @@ class Verdict:
     machine: Machine
     none: Hypothesis  # the hypothesis without effects
     best: Hypothesis  # the one with the likeliest effects
+    # the numbers of the model: what they are the next time, what differs between days
+    reproducibility: Sequence[Mapping[str, Any]] = field(default=(), kw_only=True)
 
     def __repr__(self) -> str:
         """Return the verdict and its first answer, in a line."""
@@ -63,8 +66,8 @@ class Verdict:
 
     def as_data(self) -> dict[str, Any]:
         """Return the JSON of docs/diagnosis.md as plain data."""
-        entries = {field.name: getattr(self, field.name) for field in fields(self)
-                   if field.name not in ('word', 'machine', 'none', 'best')}
+        entries = {item.name: getattr(self, item.name) for item in fields(self)
+                   if item.name not in ('word', 'machine', 'none', 'best')}
         return {'verdict': self.word, 'sentence': str(said(self)), **{
             name: entry for name, entry in entries.items() if entry is not None},
             'which': [vars(answer) for answer in self.which],
@@ -89,7 +92,8 @@ class Verdict:
             lines.append(f'  what is not named most likely enters as {place.name}, which could '
                          f'explain {100.0 * place.explained:.0f} % of the gap')
         lines += [f'  {line}' for line in _closed(self)]
-        lines += [f'  {line}' for line in lines_of_labels(self.labels or ())]
+        lines += [f'  {line}' for line in (*lines_of_labels(self.labels or ()),
+                                           *lines_of_days(self.reproducibility))]
         lines += [f'  also seen: {item["effect"]}, {100.0 * item["share"]:.2g} % of the gap'
                   for item in self.also_seen]
         lines += [f'  remains: {line}' for line in _remainders(self.remains)]

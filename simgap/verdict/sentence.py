@@ -13,6 +13,7 @@ from simgap.settings import DEFAULT
 from simgap.verdict.intervals import jackknife, TWO_SIDED_95
 from simgap.verdict.law import Law
 from simgap.verdict.law_form import nearest_form
+from simgap.verdict.reproducibility import contradictions
 from simgap.verdict.spoken import percent, quantity, size, with_interval
 
 if TYPE_CHECKING:
@@ -52,6 +53,8 @@ def said(verdict: Verdict) -> Said:
             then = [f'record {_designed(verdict)}, to tell the answers apart',
                     *(step for step in then if not step.startswith('repeat '))]
     sure = f'Probability {percent(top.probability)}.'
+    if apart := '; '.join(contradictions(verdict.reproducibility)):
+        what += f' The recordings contradict each other: {apart}.'
     return Said(what, ' '.join([sure, *_how_sure(verdict)]),
                 f'Next: {"; ".join(then)}.' if then else '')
 
@@ -74,7 +77,8 @@ def _designed(verdict: Verdict) -> str:
 
 def headline(verdict: Verdict) -> str:
     """Return the verdict in a few words, which nothing below them contradicts."""
-    word, rest = verdict.word, bool(loud(verdict.remains))
+    word, apart = verdict.word, contradictions(verdict.reproducibility)
+    rest = bool(loud(verdict.remains) or word == 'no_gap' and apart)
     fraction = verdict.how_far['explained_fraction']['value']
     if word in ('explained', 'partly_explained') and fraction is not None and fraction <= 0.0:
         return 'named, but it closes nothing of data that was not fitted'

@@ -30,7 +30,7 @@ LOUD = {'angle': {**QUIET['angle'], 'beyond_noise': 0.05}}
 def verdict(word: str, top: Named = FOUND, **entries: Any) -> Any:
     return SimpleNamespace(**{
         'word': word, 'which': [top], 'where': [], 'confusable': [], 'may_enter_at': [],
-        'remains': QUIET, 'planning': {},
+        'remains': QUIET, 'planning': {}, 'reproducibility': [],
         'machine': SimpleNamespace(catalogue=EFFECTS, words={}),
         'how_far': {'judged': top.effects, 'per_signal': {},
                     'explained_fraction': {'value': 0.99, 'ci95': [0.97, 0.996]}}, **entries})

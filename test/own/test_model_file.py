@@ -112,6 +112,9 @@ def test_numbers_effects_and_readings_are_those_of_a_declaration(
     assert model.readings['first'].unit == 'rad'
     assert model.push['load'].size == 2.0
     assert (model.settles_s, model.blocks, model.parallel) == (0.1, ('bus', 'shaft'), True)
+    restless = machine_of(tmp_path, TEXT.replace('share: 0.1', 'share: 0.1, spread: 0.3'))
+    assert [own.model.base['level'].spread for own in (machine_of(tmp_path), restless)] == [
+        0.0, 0.3]
 
 
 def test_each_number_does_what_it_says(tmp_path: Path, stand_in: list[StandIn]) -> None:

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,8 @@ from own.swing import log_of, logs, NOISE, simulate, swing, TIME
 import pytest
 from simgap.errors import UserError
 from simgap.model import (
-    diagnose_logs, effect, free, Log, machine, OwnMachine, reading, ripple, size, unseen,
+    diagnose_logs, effect, free, known, Log, machine, OwnMachine, reading, ripple, size, unseen,
+    within,
 )
 from simgap.report.page import contents
 from simgap.report.render import render
@@ -153,3 +155,20 @@ def test_the_beginning_of_a_test_is_simulated_as_in_the_whole() -> None:
 def test_names_that_are_not_there_are_told(options: dict[str, object], message: str) -> None:
     with pytest.raises(UserError, match=message.replace('?', r'\?')):
         diagnose_logs(swing(), logs(), **options)  # type: ignore[arg-type]
+
+
+def test_a_number_of_the_day_is_told_beside_that_of_the_machine() -> None:
+    days = [replace(log_of(f'log {k}', 1.0, 20 + k, {'decay': decay}), labels={'day': str(k)})
+            for k, decay in enumerate((0.1, 0.104, 0.102))]
+    model = swing(base={'pulsation': known(2.0), 'bias': free(-0.5, 0.5, 'rad'),
+                        'decay': within(0.1, 0.2, '1/s', spread=0.003)})
+    found = diagnose_logs(model, days)
+    told = {item['number']: item for item in found.as_data()['reproducibility']}
+    decay = told['decay']
+    assert decay['belongs_to'] == 'day' and not decay['differs']
+    assert [decay['by']['day'][str(k)]['value'] for k in range(3)] == pytest.approx(
+        [0.1, 0.104, 0.102], abs=5e-4)
+    assert decay['ci95'][0] < 0.102 < decay['ci95'][1]
+    assert found.numbers['decay']['value'] == pytest.approx(0.102, abs=1e-3)
+    assert 0.001 < decay['spread'] < 0.004
+    assert (told['bias']['belongs_to'], told['start[log 1]']['belongs_to']) == ('machine', 'test')
