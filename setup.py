@@ -115,8 +115,6 @@ setup(
         'completion': ['shtab >= 1.6'],
         # the page of `live`: a web server with WebSockets in one wheel that needs no other
         'live': ['tornado >= 6.1'],
-        # `live --foxglove`
-        'foxglove': ['foxglove-sdk >= 0.30'],
         # models that people have: `diagnose --model FILE.yaml`
         'mujoco': ['mujoco >= 3.3'],
         # ... and the drive as one of them: `fmu`, of FMI 2 and of FMI 3
@@ -142,9 +140,8 @@ setup(
             'pythonfmu >= 0.7',
             'pythonfmu3 >= 0.3.4',
             f"libcosimpy ; {ROS['WHEELS_EXIST']} and python_version >= '3.11'",
-            # the page and the socket for Foxglove, and a client of both
+            # the page, and a client of it
             'tornado >= 6.1',
-            'foxglove-sdk >= 0.30',
             # the linters of ament_flake8 and ament_pep257
             'flake8 >= 6',
             'flake8-builtins',

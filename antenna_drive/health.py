@@ -263,7 +263,6 @@ PARTS: dict[str, Callable[[], Iterator[Finding]]] = {
         'bags': ('mcap', 'rosbags', 'mcap_protobuf'),
         'plot': ('matplotlib',),
         'live': ('tornado',),
-        'foxglove': ('foxglove',),
         'parquet': ('pyarrow',),
         'cluster': ('distributed',),
         'completion': ('shtab',),

@@ -15,7 +15,6 @@ REMEDIES.update({
     'distributed': "pip install 'dask[distributed]'",
     'shtab': 'pip install shtab',
     'tornado': 'pip install tornado',
-    'foxglove': 'pip install foxglove-sdk',
     'pyarrow': 'pip install pyarrow',
     'pythonfmu': 'pip install pythonfmu',
     'pythonfmu3': 'pip install pythonfmu3',

@@ -14,11 +14,9 @@ and recordings. The drive never waits for the page. Ctrl-C ends the page and wha
   antenna-drive live --join                      a drive that runs already
   antenna-drive live --join --namespace /east    ... in a namespace
   antenna-drive live --host 0.0.0.0              for other machines; the address has a token
-  antenna-drive live --foxglove                  the same signals and parameters for Foxglove
 
 The page is served to this machine only, unless --host names an address. Whoever has the address
-with its token can then turn the drive; the connection is not encrypted. The socket of --foxglove
-is for this machine always; it has no token.
+with its token can then turn the drive; the connection is not encrypted.
 """
 
 import argparse
@@ -30,8 +28,6 @@ from simgap.errors import UserError
 from simgap.inputs.schema import Entry
 
 _PORT = 8034
-# that of Foxglove's own servers
-_FOXGLOVE_PORT = 8765
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -54,16 +50,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help='address to listen on, for other machines; a token is then needed')
     parser.add_argument('--token', default='', metavar='TEXT',
                         help='the token with --host; a random one if not given')
-    parser.add_argument('--foxglove', type=int, nargs='?', const=_FOXGLOVE_PORT, metavar='PORT',
-                        help='serve signals and parameters to Foxglove as well, on this machine; '
-                             f'PORT is {_FOXGLOVE_PORT} if not given, 0: any free one; needs '
-                             'foxglove-sdk')
 
 
 def run(args: argparse.Namespace) -> int:
     """Serve the page until Ctrl-C; return 0."""
-    port = Entry('1', 0, 65535, whole=True)
-    check_options(args, pace=Entry('1', 0.0, 1e3), port=port, foxglove=port)
+    check_options(args, pace=Entry('1', 0.0, 1e3), port=Entry('1', 0, 65535, whole=True))
     if args.token and not args.host:
         raise UserError('--token: is for --host; a page for this machine only needs none')
     if args.join:
@@ -85,4 +76,4 @@ def run(args: argparse.Namespace) -> int:
         join=args.join, namespace=args.namespace, experiment=experiment,
         config=tuple(args.config), parameters=parse_settings(args.settings),
         pace=1.0 if args.pace is None else args.pace, out=args.out.resolve(), port=args.port,
-        host=args.host, token=args.token, foxglove=args.foxglove))
+        host=args.host, token=args.token))

@@ -35,7 +35,6 @@ class LiveOptions:
     port: int = 0
     host: str = ''
     token: str = ''
-    foxglove: int | None = None
 
 
 def serve(options: LiveOptions) -> int:
@@ -45,9 +44,6 @@ def serve(options: LiveOptions) -> int:
     Raises AnotherDrive: there is a drive already where one is to be started.
     Raises UserError: a port is taken, a configuration or a namespace is not allowed.
     """
-    if options.foxglove is not None:
-        # what is not installed is to be said before a drive is started
-        import antenna_drive.live.foxglove  # noqa: F401
     with ExitStack() as held:
         if not options.join:
             # other tools look for the drive of a page where they were told: it has to be free
@@ -89,22 +85,14 @@ async def _serve(options: LiveOptions) -> int:
 async def _serve_session(options: LiveOptions, session: Session, ended: asyncio.Event) -> None:
     token = (options.token or secrets.token_urlsafe(24)) if options.host else ''
     server = Server(session, options.host, options.port, token)
-    foxglove = None
-    if options.foxglove is not None:
-        from antenna_drive.live.foxglove import FoxgloveServer
-        foxglove = FoxgloveServer(session, options.foxglove)
     looking = asyncio.ensure_future(session.look_after())
     whose = 'a drive that runs' if options.join else 'a drive of its own'
     print(f'{server.url}  shows {whose}; Ctrl-C ends it', flush=True)
-    if foxglove is not None:
-        print(f'{foxglove.url}  serves the same to Foxglove', flush=True)
     waiting = asyncio.ensure_future(ended.wait())
     await asyncio.wait({waiting, looking}, return_when=asyncio.FIRST_COMPLETED)
     waiting.cancel()
     looking.cancel()
     print('ending', file=sys.stderr, flush=True)
-    if foxglove is not None:
-        await foxglove.close()
     await server.close()
     if looking.done() and not looking.cancelled():
         looking.result()  # it never returns: this raises what went wrong

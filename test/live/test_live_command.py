@@ -147,7 +147,6 @@ def test_a_drive_that_was_joined_goes_on_without_the_page(
     (['--experiment', 'T9'], 'allowed are T1, T2'),
     (['--token', 'x'], '--token: is for --host'),
     (['--port', '99999'], '--port'),
-    (['--foxglove', '99999'], '--foxglove'),
     (['--pace', '-1'], '--pace'),
     (['--set', 'nothing'], 'UNIT.NAME=VALUE'),
 ])

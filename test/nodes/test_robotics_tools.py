@@ -1,20 +1,12 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""
-What robotics tools see of one running drive: joints, and the socket that Foxglove reads.
-
-The client of the socket is written from the description of the protocol, without the SDK:
-https://github.com/foxglove/ws-protocol/blob/main/docs/spec.md
-"""
+"""What robotics tools see of a running drive: joints."""
 
 from __future__ import annotations
 
-import asyncio
-from collections.abc import Callable, Iterator
-import json
+from collections.abc import Iterator
 import os
 import signal
-import struct
 import subprocess
 import sys
 from typing import Any
@@ -22,8 +14,7 @@ from typing import Any
 import pytest
 
 pytest.importorskip('rclpy', reason='rclpy is not installed: no drive to look at')
-pytest.importorskip('tornado', reason='tornado is not installed: no client')
-pytest.importorskip('foxglove', reason='foxglove-sdk is not installed')
+pytest.importorskip('tornado', reason='tornado is not installed: no page with a drive')
 
 from antenna_drive.lockstep.readings import steps_between  # noqa: E402, I100
 from antenna_drive.nodes.joint_states_node import axis_state, motor_states  # noqa: E402
@@ -35,12 +26,8 @@ from rosgraph_msgs.msg import Clock  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 from simgap.command.programs import BAD_INPUT  # noqa: E402
 from std_msgs.msg import Float64  # noqa: E402
-from tornado.httpclient import HTTPRequest  # noqa: E402
-from tornado.websocket import websocket_connect, WebSocketClientConnection  # noqa: E402
 
 PATIENCE_S = 120.0
-# Eq. (9): the greatest bias voltage is this times the bias pot [V].
-FULL_BIAS_V = 13.0
 READINGS = ('plant/encoder', 'plant/axis_rate', 'motor_1/tach_rate', 'motor_2/tach_rate',
             'motor_1/gear_torque', 'motor_2/gear_torque')
 
@@ -83,8 +70,8 @@ def test_a_wrong_parameter_is_refused_in_one_line(argument: str, said: str) -> N
 
 @pytest.fixture(scope='module')
 def live(module_domain: int, tmp_path_factory: pytest.TempPathFactory) -> Iterator[LiveCommand]:
-    """Return a page with a drive of its own, which serves Foxglove too."""
-    with LiveCommand(tmp_path_factory.mktemp('live'), module_domain, '--foxglove', '0') as live:
+    """Return a page with a drive of its own."""
+    with LiveCommand(tmp_path_factory.mktemp('live'), module_domain) as live:
         yield live
         assert live.end() == 0
         assert 'Traceback' not in live.said
@@ -95,102 +82,6 @@ def watch(live: LiveCommand, module_domain: int) -> Iterator[Watch]:
     """Return a node beside the drive."""
     with Watch(domain_id=module_domain) as watch:
         yield watch
-
-
-class Client:
-    """A client of the socket: the last message of each kind, and the data of each channel."""
-
-    def __init__(self, socket: WebSocketClientConnection) -> None:
-        self._socket = socket
-        self.told: dict[str, dict[str, Any]] = {}
-        self.values: dict[str, Any] = {}
-        self.data: dict[int, list[tuple[int, dict[str, Any]]]] = {}
-
-    @classmethod
-    async def to(cls, url: str) -> Client:
-        socket = await websocket_connect(HTTPRequest(url), subprotocols=['foxglove.sdk.v1'])
-        assert socket.selected_subprotocol == 'foxglove.sdk.v1'
-        return cls(socket)
-
-    async def say(self, op: str, **rest: Any) -> None:
-        await self._socket.write_message(json.dumps({'op': op, **rest}))
-
-    async def until(self, true: Callable[[], Any]) -> Any:
-        """Read until something is true."""
-        end = asyncio.get_running_loop().time() + PATIENCE_S
-        while not (value := true()):
-            assert asyncio.get_running_loop().time() < end, f'in vain; {self.told}'
-            message = await asyncio.wait_for(self._socket.read_message(), PATIENCE_S)
-            assert message is not None, 'the server has gone'
-            self._take(message)
-        return value
-
-    def _take(self, message: str | bytes) -> None:
-        if isinstance(message, bytes):
-            if message[0] == 1:  # message data: subscription, time [ns], what the channel encodes
-                number, time_ns = struct.unpack_from('<IQ', message, 1)
-                self.data.setdefault(number, []).append((time_ns, json.loads(message[13:])))
-            return
-        told = json.loads(message)
-        self.told[told['op']] = told
-        if told['op'] == 'parameterValues':
-            self.values |= {item['name']: item['value'] for item in told['parameters']}
-
-
-async def _see_and_set(url: str, watch: Watch) -> None:
-    pot = 'torque_share.bias_pot'
-    client = await Client.to(url)
-    channels = {channel['topic']: channel for channel in (
-        await client.until(lambda: client.told.get('advertise')))['channels']}
-    assert {'parameters', 'parametersSubscribe', 'time'} <= {
-        *client.told['serverInfo']['capabilities']}
-    assert {*channels} == {'/test_signal', '/motor_1', '/motor_2', '/torque_share', '/plant'}
-    said = json.loads(channels['/plant']['schema'])['properties']['encoder']['description']
-    assert said == 'elevation encoder reading [rad]'
-    assert {channel['encoding'] for channel in channels.values()} == {'json'}
-    await client.say('subscribe', subscriptions=[
-        {'id': number, 'channelId': channels[topic]['id']}
-        for number, topic in enumerate(['/plant', '/torque_share'])])
-    data = client.data
-    # a drive that has just begun is at rest
-    bias = await client.until(lambda: len({message['encoder'] for _, message in data.get(
-        0, [])}) > 50 and data.get(1))
-    times = [time_ns for time_ns, _ in data[0]]
-    assert all(time_ns % 10_000_000 == 9_000_000 for time_ns in times), 'steps 9, 19, 29 ...'
-    assert times == sorted({*times})
-    # a parameter that is set is in force, in the node and in what the signal does
-    await client.until(lambda: bias[-1][1]['bias_voltage'] > 0.3 * FULL_BIAS_V)
-    await client.say('getParameters', parameterNames=[])
-    await client.until(lambda: 'parameterValues' in client.told)
-    while pot not in client.values:  # nodes that are starting have not told theirs
-        client.told.pop('parameterValues', None)
-        await client.say('getParameters', parameterNames=[pot])
-        await client.until(lambda: 'parameterValues' in client.told)
-    await client.say('subscribeParameterUpdates', parameterNames=[pot])
-    await client.say('setParameters', parameters=[{'name': pot, 'value': 0.25}], id='set')
-    await client.until(lambda: client.values[pot] == 0.25)
-    assert watch.get('torque_share', 'bias_pot') == [0.25]
-    await client.until(lambda: 0.0 < bias[-1][1]['bias_voltage'] <= 0.25 * FULL_BIAS_V)
-    # what the node refuses has its reason, and the value in force is told again
-    await client.say('setParameters', parameters=[{'name': pot, 'value': 7}], id='refused')
-    reason = await client.until(lambda: client.told.get('status'))
-    assert reason['level'] == 2 and 'bias_pot' in reason['message'] and '7' in reason['message']
-    await client.until(lambda: client.told['parameterValues'].get('id') == 'refused')
-    assert client.values[pot] == 0.25
-    # what somebody else sets is told
-    assert watch.set_together('torque_share', {'bias_pot': 0.5}).successful
-    await client.until(lambda: client.values[pot] == 0.5)
-    # a run that begins again is another session, whose time begins again
-    session = client.told['serverInfo']['sessionId']
-    assert watch.call('test_signal/reset').success
-    await client.until(lambda: client.told['serverInfo']['sessionId'] != session)
-    await client.until(lambda: data[0][-1][0] < times[-1])
-
-
-def test_foxglove_sees_and_turns_the_drive(live: LiveCommand, watch: Watch) -> None:
-    said = live.line()
-    assert said.startswith('ws://localhost:')
-    asyncio.run(_see_and_set(said.split()[0], watch))
 
 
 def test_joints_are_the_readings_of_the_same_time(live: LiveCommand, watch: Watch,
