@@ -30,6 +30,7 @@ class Weighed(NamedTuple):
     share: float  # of its energy that they explain
     factors: FloatArray  # shape (m,)
     deviations: FloatArray  # of the factors, shape (m,)
+    spread: float = 0.0  # standard deviation of their prior, as likely as it can be
 
 
 class InputEvidence:
@@ -71,13 +72,6 @@ class InputEvidence:
         self.energy = float(residual @ (weight * residual)
                             - self._slope @ self._inverse @ self._slope)
         self._count = float(np.count_nonzero(weight))
-
-    def during(self, tests: Sequence[slice]) -> InputEvidence:
-        """Return that of some tests alone, given their rows."""
-        weight = np.zeros_like(self._weight)
-        for rows in tests:
-            weight[rows] = self._weight[rows]
-        return InputEvidence(self.residual, self._loud, weight, self._nuisances, self._prior)
 
     def reduced(self, responses: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
         """Return the normal equations of inputs without what the nuisances can do."""
@@ -124,7 +118,8 @@ class InputEvidence:
         return Weighed(
             float(evidence[best]), float(1.0 - left[best]),
             vectors @ (turned / stiff[:, best]) / size,
-            np.sqrt(noise * (vectors ** 2 @ (1.0 / stiff[:, best])) / size))
+            np.sqrt(noise * (vectors ** 2 @ (1.0 / stiff[:, best])) / size),
+            math.sqrt(noise * _RATIOS[best] / size))
 
     def net(self, evidence: float) -> float:
         """Return the share of the energy whose loss alone would be worth this evidence."""

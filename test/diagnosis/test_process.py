@@ -25,10 +25,10 @@ class Hunting(Pushed):
     """The same, whose left reading is a wave of which a little force decides the phase."""
 
     def simulate_disturbed(self, point: Point, place: DisturbanceInput,
-                           course: Course) -> list[FloatArray]:
+                           courses: Sequence[Course]) -> list[FloatArray]:
         """Return both readings with a force."""
         readings = self.predict(point, 0)
-        readings[:, 0] = self._wave(30.0 * np.cumsum(course(TIME)) * TIME[1])
+        readings[:, 0] = self._wave(30.0 * np.cumsum(courses[0](TIME)) * TIME[1])
         return [readings]
 
     def predict(self, point: Point, experiment: int) -> FloatArray:
