@@ -232,7 +232,8 @@ class AntennaMachine(Machine):
         assert isinstance(place, DriveDisturbance)
 
         def run(k: int) -> FloatArray:
-            return self._read(k, self._run(self._job(k, point, math.inf), (place, courses[k])), point)
+            job = self._job(k, point, math.inf)
+            return self._read(k, self._run(job, (place, courses[k])), point)
 
         return list(self._map(run, range(len(self._tests))))
 

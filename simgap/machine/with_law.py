@@ -1,17 +1,79 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""A machine with one effect more: an input that is a function of something that the machine does."""
+"""A law: an input that is a function of something that the machine does, as one effect more."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from copy import copy
+from dataclasses import dataclass, replace
 import math
 
 import numpy as np
 from simgap.machine.arrays import Course, FloatArray, Point
-from simgap.machine.effect import Effect
+from simgap.machine.effect import Effect, Form, Parameter
 from simgap.machine.machine import DisturbanceInput, Machine, Wrapped
+
+# No value of a law is farther off than so many times what it was thought to be.
+_FARTHEST = 30.0
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """Something that a machine does: its unit, and its values in each test."""
+
+    unit: str
+    values: list[FloatArray]
+
+
+Quantities = Mapping[str, Quantity]
+
+
+@dataclass(frozen=True)
+class Law:
+    """An input as a function of one quantity, the same in all tests."""
+
+    by: str  # the quantity
+    times: str  # what it is in proportion to; empty for nothing
+    evidence: float  # natural logarithm of how much likelier it makes the gap
+    at: tuple[float, ...]  # values of the quantity
+    values: tuple[float, ...]  # of the input there, over the factor
+    deviations: tuple[float, ...]  # standard deviations of these values
+    by_unit: str  # of the quantity
+    unit: str  # of the values
+    width: float  # of the hats that the function is made of, in by_unit
+    spread: float  # standard deviation that the values were thought to have
+    # share of what is left of each test that it takes, fitted to the others; None for one test
+    withheld: float | None = None
+
+    def __str__(self) -> str:
+        return self.by + (f', in proportion to {self.times}' if self.times else '')
+
+    def as_effect(self, place: DisturbanceInput) -> Effect:
+        """Return the effect that it is at a place, whose sizes are its values."""
+        ident = f'{place.component}.law'
+        most = _FARTHEST * max(self.spread, *map(abs, self.values))
+        return Effect(ident, place.component, f'{place.name} as a function of {self}', (Form(
+            str(self), tuple(Parameter(
+                f'{ident}.at {at:.6g}', self.unit, -most, most, 0.1 * self.spread, self.spread,
+                start=value) for at, value in zip(self.at, self.values, strict=True)),
+            scanned=True),))
+
+    def in_units(self, size: float, unit: str) -> Law:
+        """Return the law of an input, one of which is of a size in a unit."""
+        per = f'{unit}/({self.unit})' if self.unit else unit
+        return replace(self, values=tuple(size * value for value in self.values), unit=per,
+                       deviations=tuple(size * value for value in self.deviations),
+                       spread=size * self.spread)
+
+    def weights(self, quantities: Quantities) -> list[FloatArray]:
+        """Return what one unit of each of the k values adds over time in each test, (n, k)."""
+        at = np.array(self.at)
+        factors = quantities[self.times].values if self.times else [
+            np.ones_like(values) for values in quantities[self.by].values]
+        return [factor[:, np.newaxis] * np.maximum(0.0, 1.0 - np.abs(np.clip(
+            values, at.min(), at.max())[:, np.newaxis] - at) / self.width)
+            for factor, values in zip(factors, quantities[self.by].values, strict=True)]
 
 
 class WithLaw(Wrapped):

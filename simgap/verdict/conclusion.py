@@ -16,10 +16,10 @@ from simgap.search.search import Found, Search
 from simgap.settings import Settings
 from simgap.verdict import unknown_input, verdict
 from simgap.verdict.held_out import held_out
-from simgap.verdict.law_fit import lawful_fit, white
 from simgap.verdict.intervals import deviations, inflation, jackknife
 from simgap.verdict.interventions import simplified
 from simgap.verdict.lack_of_fit import enough
+from simgap.verdict.law_fit import lawful_fit
 
 
 @dataclass(frozen=True)
@@ -48,9 +48,8 @@ def concluded(machine: Machine, progress: Callable[[float, str], None], threads:
     # what is louder than the stated noise, or slower than the error of a model, is no noise
     machine = found.problem.machine.truncated()
     stated = with_noise_left(machine, point, settings.noise, 1.0)
-    places = unknown_input.places(
-        LeastSquares(stated, settings=settings), point, white(LeastSquares(
-            machine, settings=settings)))
+    judged = LeastSquares(stated, settings=settings)
+    places = unknown_input.places(judged, point, judged.as_stated())
     law = lawful_fit(found, places, threads)
     decision = verdict.decide(found, places, law.gained if law else 0.0, enough(found.problem))
     if law and law.gained > 0.0:

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 import math
 from typing import NamedTuple
 
@@ -52,20 +51,12 @@ class InputEvidence:
                                          or np.ones(len(e.channels)), e.time.size)
                                  for e in problem.experiments])
         loud = min(1.0, float(np.mean((stated * residual)[problem.valid] ** 2)))
-        # what acts every day is known to a share only, as the form of an effect is
-        acts = any(e.process is not None for e in problem.experiments)
-        bare = LeastSquares(problem.machine.with_experiments(
-            [replace(e, process=None) for e in problem.experiments]),
-            settings=problem.settings).residuals(here) if acts else residual
-        taken = 0.5 * float(weight @ (bare ** 2 - residual ** 2))
-        return cls(residual, loud, weight, jacobian, prior_precision(nuisances),
-                   problem.settings.evidence.form_error ** 2 * max(taken, 0.0))
+        return cls(residual, loud, weight, jacobian, prior_precision(nuisances))
 
     def __init__(self, residual: FloatArray, loud: float, weight: FloatArray,
-                 nuisances: FloatArray, prior: FloatArray, process_error: float = 0.0) -> None:
-        self.residual, self._weight = residual, weight
-        self._loud, self.process_error = loud, process_error
-        self._nuisances, self._prior = nuisances, prior
+                 nuisances: FloatArray, prior: FloatArray) -> None:
+        self.residual, self._loud, self._weight = residual, loud, weight
+        self._nuisances = nuisances
         square = nuisances.T @ (nuisances * weight[:, np.newaxis]) + np.diag(prior)
         self._inverse = np.linalg.pinv(square, hermitian=True)
         self._slope = nuisances.T @ (weight * residual)

@@ -1,15 +1,16 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""A law: an unknown input that is a function of something that the machine does."""
+"""The likeliest law of an unknown input, linear about a fit."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from simgap.fit.least_squares import LeastSquares
 from simgap.machine.contract import FloatArray
+from simgap.machine.with_law import Law, Quantities, Quantity
 from simgap.verdict.input_evidence import InputEvidence
 
 # A function has its values at so many places of the range, with straight lines between.
@@ -18,54 +19,6 @@ _PLACES = 12
 REACHED = 0.05
 # What an input may be in proportion to.
 _FACTORS = ('direction', 'load', 'rate')
-
-
-@dataclass(frozen=True)
-class Quantity:
-    """Something that a machine does: its unit, and its values in each test."""
-
-    unit: str
-    values: list[FloatArray]
-
-
-Quantities = Mapping[str, Quantity]
-
-
-@dataclass(frozen=True)
-class Law:
-    """An input as a function of one quantity, the same in all tests."""
-
-    by: str  # the quantity
-    times: str  # what it is in proportion to; empty for nothing
-    evidence: float  # natural logarithm of how much likelier it makes the gap
-    at: tuple[float, ...]  # values of the quantity
-    values: tuple[float, ...]  # of the input there, over the factor
-    deviations: tuple[float, ...]  # standard deviations of these values
-    by_unit: str  # of the quantity
-    unit: str  # of the values
-    width: float  # of the hats that the function is made of, in by_unit
-    spread: float  # standard deviation that the values were thought to have
-    # share of what is left of each test that it takes, fitted to the others; None for one test
-    withheld: float | None = None
-
-    def __str__(self) -> str:
-        return self.by + (f', in proportion to {self.times}' if self.times else '')
-
-    def in_units(self, size: float, unit: str) -> Law:
-        """Return the law of an input, one of which is of a size in a unit."""
-        per = f'{unit}/({self.unit})' if self.unit else unit
-        return replace(self, values=tuple(size * value for value in self.values), unit=per,
-                       deviations=tuple(size * value for value in self.deviations),
-                       spread=size * self.spread)
-
-    def weights(self, quantities: Quantities) -> list[FloatArray]:
-        """Return what one unit of each of the k values adds over time in each test, (n, k)."""
-        at = np.array(self.at)
-        factors = quantities[self.times].values if self.times else [
-            np.ones_like(values) for values in quantities[self.by].values]
-        return [factor[:, np.newaxis] * np.maximum(0.0, 1.0 - np.abs(np.clip(
-            values, at.min(), at.max())[:, np.newaxis] - at) / self.width)
-            for factor, values in zip(factors, quantities[self.by].values, strict=True)]
 
 
 def quantities_of(problem: LeastSquares, point: Mapping[str, float]) -> Quantities:
@@ -111,7 +64,7 @@ def likeliest(evidence: InputEvidence, square: FloatArray, slope: FloatArray,
             if (size := float(np.trace(own)) / max(len(own), 1)) <= 0.0:
                 continue
             found = evidence.weighed(own, columns.T @ slope, size)
-            if found.evidence > (best.evidence if best else evidence.process_error):
+            if found.evidence > (best.evidence if best else 0.0):
                 best = Law(by, times, found.evidence, tuple(at[kept].tolist()),
                            tuple(found.factors.tolist()), tuple(found.deviations.tolist()),
                            quantity.unit, factor.unit, float(at[1] - at[0]), found.spread)

@@ -15,21 +15,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 from simgap.fit.least_squares import LeastSquares
 from simgap.fit.noise import with_noise_left
-from simgap.machine.contract import DisturbanceInput, Effect, FloatArray, Form, Parameter
-from simgap.machine.with_law import WithLaw
+from simgap.machine.contract import FloatArray
+from simgap.machine.with_law import Law, WithLaw
 from simgap.search import moves
 from simgap.search.evidence import Evidence
 from simgap.search.hypothesis import Hypothesis
 from simgap.search.screening import Sensitivity
 from simgap.search.search import Found
 from simgap.verdict.held_out import held_out
-from simgap.verdict.law import Law, quantities_of, REACHED
+from simgap.verdict.law import quantities_of, REACHED
 from simgap.verdict.unknown_input import Place, readings_of
 
 # A law moves the machine, and so what it is a function of.
 _ROUNDS = 2
-# No value of a law is farther off than so many times what it was thought to be.
-_FARTHEST = 30.0
 
 
 @dataclass(frozen=True)
@@ -40,19 +38,13 @@ class LawfulFit:
     gained: float  # evidence beyond that of the best of the catalogue, with the law's price
 
 
-def white(problem: LeastSquares) -> LeastSquares:
-    """Return a problem with the stated noise, which is white."""
-    return LeastSquares(problem.machine.with_experiments(
-        [replace(e, colours=()) for e in problem.experiments]), settings=problem.settings)
-
-
 def lawful_fit(found: Found, places: Sequence[Place], threads: int = 1) -> LawfulFit | None:
     """Return the likeliest law of all places, in the fit; None if none promises its price."""
     place = max((place for place in places if place.law),
                 key=lambda place: place.law.evidence if place.law else 0.0, default=None)
     if place is None or place.law is None:
         return None
-    base, problem = found.best, white(found.problem)
+    base, problem = found.best, found.problem.as_stated()
     level = problem.noise_level(problem.residuals(base.state.point()))
     problem = problem.at_scale(max(level, 1.0))
     begun = replace(base, state=problem.start(base.state.parameters, base.state.point()))
@@ -83,26 +75,16 @@ def _added(problem: LeastSquares, base: Hypothesis, place: Place,
     """Return a machine that knows a law, and a hypothesis with it beside what another has."""
     source = next(item for item in (*problem.machine.disturbance_inputs, *readings_of(problem))
                   if item.name == place.name)
-    effect = _effect(source, law)
-    form, found, lawful = effect.forms[0], base, problem
-    point = {**base.state.point(), **{
-        p.name: value for p, value in zip(form.parameters, law.values, strict=True)}}
+    effect, found, lawful = law.as_effect(source), base, problem
+    item = Sensitivity(effect.id, effect.forms[0], np.zeros((0, 0), np.float32))
+    point = item.form.start
     for _ in range(_ROUNDS):
         machine = WithLaw(problem.machine, effect, source, [
             own / source.size for own in law.weights(quantities_of(lawful, found.state.point()))])
         lawful = LeastSquares(machine, scale=problem.scale, settings=problem.settings)
-        found = moves.added(lawful, base, Sensitivity(
-            effect.id, form, np.zeros((0, 0), np.float32)), point)
+        found = moves.added(lawful, base, item, point)
         point = found.state.point()
     return machine, found
-
-
-def _effect(place: DisturbanceInput, law: Law) -> Effect:
-    ident = f'{place.component}.law'
-    most = _FARTHEST * max(law.spread, *map(abs, law.values))
-    return Effect(ident, place.component, f'{place.name} as a function of {law}', (Form(
-        str(law), tuple(Parameter(f'{ident}.at {at:.6g}', law.unit, -most, most,
-                                  0.1 * law.spread, law.spread) for at in law.at), scanned=True),))
 
 
 def _as_fitted(law: Law, found: Hypothesis, reached: FloatArray, gained: float,

@@ -11,8 +11,9 @@ import numpy as np
 from simgap.fit.least_squares import LeastSquares
 from simgap.machine.contract import DisturbanceInput, FloatArray
 from simgap.machine.pulses import answers
+from simgap.machine.with_law import Law
 from simgap.verdict.input_evidence import InputEvidence
-from simgap.verdict.law import Law, likeliest, quantities_of
+from simgap.verdict.law import likeliest, quantities_of
 
 # Times within which an input changes, in pulses.
 _SMOOTH = (0.0, 5.0)
@@ -48,11 +49,11 @@ def places(problem: LeastSquares, point: Mapping[str, float],
                peaks: Sequence[FloatArray], smooth: Sequence[float]) -> None:
         weighed, share, _ = evidence.of_course(
             *evidence.reduced(_seen(problem, responses)), [own.size for own in peaks], smooth)
-        law = for_laws and likeliest(for_laws, *for_laws.reduced(_seen(plain, responses)), {
+        law = likeliest(for_laws, *for_laws.reduced(_seen(plain, responses)), {
             name: replace(quantity, values=[
                 np.interp(moments, e.time, own) for moments, e, own in zip(
                     peaks, problem.experiments, quantity.values, strict=True)])
-            for name, quantity in quantities.items()})
+            for name, quantity in quantities.items()}) if plain and for_laws else None
         found.append((share, Place(place.name, place.component, weighed, evidence.net(weighed),
                                    law.in_units(place.size, place.unit) if law else None)))
 

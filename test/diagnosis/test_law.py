@@ -11,18 +11,20 @@ import numpy as np
 import pytest
 from simgap.fit.least_squares import LeastSquares
 from simgap.machine.contract import (
-    Course, DisturbanceInput, Experiment, FloatArray, Machine, Motion, Parameter, Point, TimeScales,
+    Course, DisturbanceInput, Experiment, FloatArray, Machine, Motion, Parameter, Point,
+    TimeScales,
 )
+from simgap.machine.with_law import Law
 from simgap.search.evidence import Evidence
 from simgap.search.hypothesis import Hypothesis
 from simgap.search.search import Found
 from simgap.settings import DEFAULT
 from simgap.verdict.diagnosis import diagnose
-from simgap.verdict.law import Law, quantities_of
+from simgap.verdict.law import quantities_of
 from simgap.verdict.law_fit import lawful_fit, LawfulFit
 from simgap.verdict.law_form import nearest_form
 from simgap.verdict.unknown_input import places
-from two_lags import answered, TIME, TwoLags
+from two_lags import TIME, TwoLags
 
 ANGLE: FloatArray = np.sin(0.9 * TIME) + 0.6 * np.sin(1.7 * TIME + 0.4)
 RATE: FloatArray = np.gradient(ANGLE, TIME)

@@ -12,7 +12,7 @@ import pytest
 from simgap.machine.contract import Effect, Form, Parameter
 from simgap.next_test.design import objective_for, SEPARATE
 from simgap.next_test.rivals import Findings
-from simgap.verdict.law import Law
+from simgap.machine.with_law import Law
 from simgap.verdict.record import Named
 from simgap.verdict.sentence import headline, said
 from simgap.verdict.spoken import number, percent
@@ -155,8 +155,8 @@ def test_unknown_says_place_size_and_when_and_what_would_settle_it() -> None:
         'angle (reversal). The model misses angle by 0.0432 rad rms. As force on the carriage it '
         'could explain 83 percent of the gap, best as a function of angle, in proportion to load. '
         'It goes from 0.5 N/A at 0 rad to -2 N/A at 2 rad, most like a parabola, which lacks less '
-        'than 0.1 percent of it; fitted to the other recordings it takes 40 percent off what is '
-        'left of one.')
+        'than 0.1 percent of it; it closes 40 percent of the gap of recordings that were not '
+        'fitted.')
     assert 'one test is not enough' in found.then and '`propose`' in found.then
 
 

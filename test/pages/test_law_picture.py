@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from simgap.report.law_picture import picture
-from simgap.verdict.law import Law
+from simgap.machine.with_law import Law
 
 AT, VALUES, DEVIATIONS = (-2.0, 0.0, 1.0, 4.0), (-3.0, 0.0, 1.0, 5.0), (0.5, 0.0, 0.25, 1.0)
 

@@ -20,7 +20,7 @@ import pytest
 from simgap.machine.contract import Effect, Excerpt, Experiment, Form, Parameter
 from simgap.machine.diagram import Diagram, DiagramBlock
 from simgap.report.page import contents
-from simgap.verdict.law import Law
+from simgap.machine.with_law import Law
 from simgap.verdict.record import Named, Verdict
 from simgap.verdict.unknown_input import Place
 
