@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What acts every day: its pattern where a machine is linear, and that there is none elsewhere."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np

@@ -10,9 +10,9 @@ from typing import Any
 
 import pytest
 from simgap.machine.contract import Effect, Form, Parameter
+from simgap.machine.with_law import Law
 from simgap.next_test.design import objective_for, SEPARATE
 from simgap.next_test.rivals import Findings
-from simgap.machine.with_law import Law
 from simgap.verdict.record import Named
 from simgap.verdict.sentence import headline, said
 from simgap.verdict.spoken import number, percent
@@ -143,7 +143,7 @@ def test_agreement_is_not_said_beside_a_remainder_that_is_louder_than_noise() ->
 def test_unknown_says_place_size_and_when_and_what_would_settle_it() -> None:
     place = SimpleNamespace(name='force on the carriage', component='carriage', explained=0.83,
                             law=Law('angle', 'load', 31.0, (0.0, 1.0, 2.0), (0.5, 0.0, -2.0),
-                                    (0.1, 0.1, 0.1), 'rad', 'N/A', 0.4))
+                                    (0.1, 0.1, 0.1), 'rad', 'N/A', 1.0, 1.0, 0.4))
     found = said(verdict(
         'unknown_effect', Named(['unknown'], 0.9, {}), may_enter_at=[place],
         where=[{'component': 'carriage', 'signal': 'angle', 'regime': 'reversal', 'share': 0.6}],
