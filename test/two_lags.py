@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from scipy.signal import lfilter
 from simgap.machine.contract import (
@@ -46,11 +48,12 @@ class TwoLags(Machine):
         return np.column_stack([step, 0.0 * TIME]) + point.get('zero', 0.0)
 
     def simulate_disturbed(self, point: Point, place: DisturbanceInput,
-                           course: Course) -> list[FloatArray]:
+                           courses: Sequence[Course]) -> list[FloatArray]:
         """Return both readings with a force on one lag."""
-        readings = self.predict(point, 0)
-        readings[:, int(place.component == 'right')] += answered(course(TIME))
-        return [readings]
+        found = [self.predict(point, k) for k in range(len(courses))]
+        for readings, course in zip(found, courses, strict=True):
+            readings[:, int(place.component == 'right')] += answered(course(TIME))
+        return found
 
     def motion(self, experiment: int) -> Motion:
         """Return the halves of the test."""

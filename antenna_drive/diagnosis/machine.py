@@ -227,12 +227,13 @@ class AntennaMachine(Machine):
         return results
 
     def simulate_disturbed(self, point: Point, place: DisturbanceInput,
-                           course: Course) -> list[FloatArray]:
+                           courses: Sequence[Course]) -> list[FloatArray]:
         """Return the readings with an unknown input; see `Machine.simulate_disturbed`."""
         assert isinstance(place, DriveDisturbance)
 
         def run(k: int) -> FloatArray:
-            return self._read(k, self._run(self._job(k, point, math.inf), (place, course)), point)
+            job = self._job(k, point, math.inf)
+            return self._read(k, self._run(job, (place, courses[k])), point)
 
         return list(self._map(run, range(len(self._tests))))
 

@@ -55,6 +55,11 @@ class LeastSquares:
         other._process = self._process
         return other
 
+    def as_stated(self) -> LeastSquares:
+        """Return the same problem with the stated noise, which is white."""
+        return LeastSquares(self.machine.with_experiments(
+            [replace(e, colours=()) for e in self.experiments]), settings=self.settings)
+
     def rows(self, experiment: int) -> slice:
         """Return where an experiment's residuals lie."""
         end = int(self.ends[experiment])

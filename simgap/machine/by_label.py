@@ -198,10 +198,10 @@ class ByLabel(Wrapped):
         return rows
 
     def simulate_disturbed(self, point: Point, place: DisturbanceInput,
-                           course: Course) -> list[FloatArray]:
+                           courses: Sequence[Course]) -> list[FloatArray]:
         if not self.labels.are_in(point):
-            return self.inner.simulate_disturbed(point, place, course)
-        return [self.inner.simulate_disturbed(self.labels.in_test(point, k), place, course)[k]
+            return self.inner.simulate_disturbed(point, place, courses)
+        return [self.inner.simulate_disturbed(self.labels.in_test(point, k), place, courses)[k]
                 for k in range(len(self.experiments))]
 
     def around(self, inner: Machine) -> Machine:

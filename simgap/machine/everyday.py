@@ -184,10 +184,10 @@ class _Everyday(Wrapped):
             self.experiments[experiment].measured.shape)
 
     def simulate_disturbed(self, point: Point, place: DisturbanceInput,
-                           course: Course) -> list[FloatArray]:
+                           courses: Sequence[Course]) -> list[FloatArray]:
         inner, sizes = self._parted(point)
         return [self._with(values, k, sizes) for k, values in enumerate(
-            self.inner.simulate_disturbed(inner, place, course))]
+            self.inner.simulate_disturbed(inner, place, courses))]
 
     def around(self, inner: Machine) -> Machine:
         return self if inner is self.inner else self._around(

@@ -148,12 +148,12 @@ class Machine(ABC):
         return None
 
     def simulate_disturbed(self, point: Point, place: DisturbanceInput,
-                           course: Course) -> list[FloatArray]:
+                           courses: Sequence[Course]) -> list[FloatArray]:
         """
         Return the readings of each experiment, shape (n, c), with an unknown input.
 
-        `place` is one of `disturbance_inputs`; `course` is the input over time, in a unit that
-        moves the machine a little.
+        `place` is one of `disturbance_inputs`; `courses` are the input over time in each
+        experiment, in a unit that moves the machine a little.
         """
         raise NotImplementedError(f'{type(self).__name__} names disturbance_inputs '
                                   'and lacks simulate_disturbed')

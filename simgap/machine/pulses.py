@@ -31,8 +31,8 @@ def answers(machine: Machine, point: Point, place: DisturbanceInput, size: float
     end = max(float(e.time[-1]) for e in machine.experiments) + usual.response_s
     slow = np.arange(begin, end, usual.response_s)
     alone = [[np.nan_to_num(one - none) for one, none in zip(machine.simulate_disturbed(
-        point, place, partial(_pulse, peak=peak, rise=usual.response_s, size=size)), still,
-        strict=True)] for peak in slow.tolist()]
+        point, place, [partial(_pulse, peak=peak, rise=usual.response_s, size=size)] * len(still)),
+        still, strict=True)] for peak in slow.tolist()]
     found = []
     for k, (experiment, (quick, peaks)) in enumerate(zip(
             machine.experiments, _quick(machine, point, place, begin, size, scales, still),
@@ -64,7 +64,7 @@ def _quick(machine: Machine, point: Point, place: DisturbanceInput, begin: float
     for shift in np.arange(0.0, scales.response_s - 0.5 * scales.pulse_s, scales.pulse_s):
         first = begin + float(shift)
         disturbed = machine.simulate_disturbed(
-            point, place, partial(_comb, first=first, scales=scales, size=size))
+            point, place, [partial(_comb, first=first, scales=scales, size=size)] * len(still))
         for k, experiment in enumerate(machine.experiments):
             change = np.nan_to_num(disturbed[k] - still[k])
             parts[k] += _parted(experiment, change, first, scales)

@@ -92,7 +92,7 @@ def _differs_in_itself(machine: OwnMachine) -> Iterator[str]:
 def _idle_pushes(machine: OwnMachine) -> Iterator[str]:
     neutral = [machine.predict({}, k) for k in range(len(machine.logs))]
     for place in machine.disturbance_inputs:
-        pushed = machine.simulate_disturbed({}, place, np.ones_like)
+        pushed = machine.simulate_disturbed({}, place, [np.ones_like] * len(neutral))
         change = max(_rms((one - other) / experiment.noise) for one, other, experiment in zip(
             pushed, neutral, machine.experiments, strict=True))
         if change < NO_RESPONSE:

@@ -95,10 +95,10 @@ class OwnMachine(Machine):
         return self.pushed(point, experiment, {}, until)
 
     def simulate_disturbed(self, point: Point, place: DisturbanceInput,
-                           course: Course) -> list[FloatArray]:
+                           courses: Sequence[Course]) -> list[FloatArray]:
         name = self.push_at(place.name)
         return [self.pushed(point, k, {name: self.model.push[name].size * course(log.time)})
-                for k, log in enumerate(self.logs)]
+                for k, (log, course) in enumerate(zip(self.logs, courses, strict=True))]
 
     def push_at(self, label: str) -> str:
         """Return the name of the place with a label."""
@@ -152,12 +152,12 @@ class OwnMachine(Machine):
 
     def motion(self, experiment: int) -> Motion:
         """Return the motion by the first reading whose unit is that of a position or a rate."""
-        log, time = self.logs[experiment], self.experiments[experiment].time
+        time, measured = self.experiments[experiment].time, self.experiments[experiment].measured
         angle, rate, units = None, None, {}
-        for name, item in self.model.readings.items():
+        for item, column in zip(self.model.readings.values(), measured.T, strict=True):
             unit, per_second, _ = item.unit.partition('/s')
             if unit in _POSITIONS:
-                rate = log[item.column or name][::self._strides[experiment]]
+                rate = column
                 units = {'rate': f'{unit}/s', 'angle': unit}
                 if not per_second:
                     angle, rate = rate, np.gradient(rate, time)

@@ -5,7 +5,7 @@
 from typing import Any
 
 import numpy as np
-from simgap.verdict.law import Law
+from simgap.machine.with_law import Law
 from simgap.verdict.spoken import number
 
 WIDTH, HEIGHT = 440.0, 150.0

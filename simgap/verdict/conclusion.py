@@ -19,6 +19,7 @@ from simgap.verdict.held_out import held_out
 from simgap.verdict.intervals import deviations, inflation, jackknife
 from simgap.verdict.interventions import simplified
 from simgap.verdict.lack_of_fit import enough
+from simgap.verdict.law_fit import lawful_fit
 
 
 @dataclass(frozen=True)
@@ -47,10 +48,14 @@ def concluded(machine: Machine, progress: Callable[[float, str], None], threads:
     # what is louder than the stated noise, or slower than the error of a model, is no noise
     machine = found.problem.machine.truncated()
     stated = with_noise_left(machine, point, settings.noise, 1.0)
-    places = unknown_input.places(LeastSquares(stated, settings=settings), point)
-    decision = verdict.decide(found, places, enough(found.problem))
-    if decision.unknown >= settings.verdict.partly and (
-            verdict.beyond_price(found, places) <= 0.0):
+    judged = LeastSquares(stated, settings=settings)
+    places = unknown_input.places(judged, point, judged.as_stated())
+    law = lawful_fit(found, places, threads)
+    decision = verdict.decide(found, places, law.gained if law else 0.0, enough(found.problem))
+    if law and law.gained > 0.0:
+        places = [law.place, *(replace(place, law=None) for place in places
+                               if place.name != law.place.name)]
+    elif decision.unknown >= settings.verdict.partly:
         # a place is not to blame for what pulses cannot follow, nor for more than its everyday
         machine = machine.with_experiments([replace(e, process=None) for e in machine.experiments])
         places = unknown_input.places(LeastSquares(machine, settings=settings), point)

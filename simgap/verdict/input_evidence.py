@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 import math
 from typing import NamedTuple
 
@@ -30,6 +29,7 @@ class Weighed(NamedTuple):
     share: float  # of its energy that they explain
     factors: FloatArray  # shape (m,)
     deviations: FloatArray  # of the factors, shape (m,)
+    spread: float = 0.0  # standard deviation of their prior, as likely as it can be
 
 
 class InputEvidence:
@@ -51,33 +51,18 @@ class InputEvidence:
                                          or np.ones(len(e.channels)), e.time.size)
                                  for e in problem.experiments])
         loud = min(1.0, float(np.mean((stated * residual)[problem.valid] ** 2)))
-        # what acts every day is known to a share only, as the form of an effect is
-        acts = any(e.process is not None for e in problem.experiments)
-        bare = LeastSquares(problem.machine.with_experiments(
-            [replace(e, process=None) for e in problem.experiments]),
-            settings=problem.settings).residuals(here) if acts else residual
-        taken = 0.5 * float(weight @ (bare ** 2 - residual ** 2))
-        return cls(residual, loud, weight, jacobian, prior_precision(nuisances),
-                   problem.settings.evidence.form_error ** 2 * max(taken, 0.0))
+        return cls(residual, loud, weight, jacobian, prior_precision(nuisances))
 
     def __init__(self, residual: FloatArray, loud: float, weight: FloatArray,
-                 nuisances: FloatArray, prior: FloatArray, process_error: float = 0.0) -> None:
-        self.residual, self._weight = residual, weight
-        self._loud, self.process_error = loud, process_error
-        self._nuisances, self._prior = nuisances, prior
+                 nuisances: FloatArray, prior: FloatArray) -> None:
+        self.residual, self._loud, self._weight = residual, loud, weight
+        self._nuisances = nuisances
         square = nuisances.T @ (nuisances * weight[:, np.newaxis]) + np.diag(prior)
         self._inverse = np.linalg.pinv(square, hermitian=True)
         self._slope = nuisances.T @ (weight * residual)
         self.energy = float(residual @ (weight * residual)
                             - self._slope @ self._inverse @ self._slope)
         self._count = float(np.count_nonzero(weight))
-
-    def during(self, tests: Sequence[slice]) -> InputEvidence:
-        """Return that of some tests alone, given their rows."""
-        weight = np.zeros_like(self._weight)
-        for rows in tests:
-            weight[rows] = self._weight[rows]
-        return InputEvidence(self.residual, self._loud, weight, self._nuisances, self._prior)
 
     def reduced(self, responses: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
         """Return the normal equations of inputs without what the nuisances can do."""
@@ -124,7 +109,8 @@ class InputEvidence:
         return Weighed(
             float(evidence[best]), float(1.0 - left[best]),
             vectors @ (turned / stiff[:, best]) / size,
-            np.sqrt(noise * (vectors ** 2 @ (1.0 / stiff[:, best])) / size))
+            np.sqrt(noise * (vectors ** 2 @ (1.0 / stiff[:, best])) / size),
+            math.sqrt(noise * _RATIOS[best] / size))
 
     def net(self, evidence: float) -> float:
         """Return the share of the energy whose loss alone would be worth this evidence."""

@@ -1,66 +1,35 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""A law: an unknown input that is a function of something that the machine does."""
+"""The likeliest law of an unknown input, linear about a fit."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from simgap.fit.least_squares import LeastSquares
 from simgap.machine.contract import FloatArray
+from simgap.machine.with_law import Law, Quantities, Quantity
 from simgap.verdict.input_evidence import InputEvidence
 
 # A function has its values at so many places of the range, with straight lines between.
 _PLACES = 12
 # Places that are hardly reached have no value: their share of the greatest hat.
-_REACHED = 0.05
+REACHED = 0.05
 # What an input may be in proportion to.
 _FACTORS = ('direction', 'load', 'rate')
-
-
-@dataclass(frozen=True)
-class Quantity:
-    """Something that a machine does: its unit, and its values in each test."""
-
-    unit: str
-    values: list[FloatArray]
-
-
-Quantities = Mapping[str, Quantity]
-
-
-@dataclass(frozen=True)
-class Law:
-    """An input as a function of one quantity, the same in all tests."""
-
-    by: str  # the quantity
-    times: str  # what it is in proportion to; empty for nothing
-    evidence: float  # natural logarithm of how much likelier it makes the gap
-    at: tuple[float, ...]  # values of the quantity
-    values: tuple[float, ...]  # of the input there, over the factor
-    deviations: tuple[float, ...]  # standard deviations of these values
-    by_unit: str  # of the quantity
-    unit: str  # of the values
-    # share of what is left of each test that it takes, fitted to the others; None for one test
-    withheld: float | None = None
-
-    def __str__(self) -> str:
-        return self.by + (f', in proportion to {self.times}' if self.times else '')
-
-    def in_units(self, size: float, unit: str) -> Law:
-        """Return the law of an input, one of which is of a size in a unit."""
-        per = f'{unit}/({self.unit})' if self.unit else unit
-        return replace(self, values=tuple(size * value for value in self.values), unit=per,
-                       deviations=tuple(size * value for value in self.deviations))
 
 
 def quantities_of(problem: LeastSquares, point: Mapping[str, float]) -> Quantities:
     """Return what the machine does, by name, at the samples of each test."""
     found: dict[str, Quantity] = {}
+    # the motion of the model, because what was measured has noise
+    readings = [problem.machine.predict(point, k) for k in range(len(problem.experiments))]
+    moving = problem.machine.with_experiments([replace(e, measured=own) for e, own in zip(
+        problem.experiments, readings, strict=True)])
     for k, experiment in enumerate(problem.experiments):
-        motion, predicted = problem.machine.motion(k), problem.machine.predict(point, k).T
+        motion, predicted = moving.motion(k), readings[k].T
         # a reading counts, where the motion has a quantity of its name
         seen = {name: (motion.unit(name), own) for name, own in motion.covariates().items()}
         seen |= {name: (unit, own) for name, unit, own in zip(
@@ -73,12 +42,11 @@ def quantities_of(problem: LeastSquares, point: Mapping[str, float]) -> Quantiti
 
 
 def likeliest(evidence: InputEvidence, square: FloatArray, slope: FloatArray,
-              quantities: Quantities) -> tuple[Law, FloatArray] | None:
+              quantities: Quantities) -> Law | None:
     """
     Return the likeliest law of an input, given its normal equations; None if none helps.
 
-    `quantities` have values at the m pulses of all tests. The second is what the pulses have of
-    the law's k values, shape (m, k).
+    `quantities` have values at the m pulses of all tests.
     """
     best = None
     factors = {'': Quantity('', []), **{
@@ -90,42 +58,17 @@ def likeliest(evidence: InputEvidence, square: FloatArray, slope: FloatArray,
                 continue
             at, columns = _hats(np.concatenate(quantity.values))
             reached = np.abs(weight * columns).max(axis=0)
-            kept = reached > _REACHED * reached.max()
+            kept = reached > REACHED * reached.max()
             columns = (weight * columns)[:, kept]
             own = columns.T @ square @ columns
             if (size := float(np.trace(own)) / max(len(own), 1)) <= 0.0:
                 continue
             found = evidence.weighed(own, columns.T @ slope, size)
-            gained = found.evidence - evidence.process_error
-            if gained > (best[0].evidence if best else 0.0):
-                best = Law(by, times, gained, tuple(at[kept].tolist()),
+            if found.evidence > (best.evidence if best else 0.0):
+                best = Law(by, times, found.evidence, tuple(at[kept].tolist()),
                            tuple(found.factors.tolist()), tuple(found.deviations.tolist()),
-                           quantity.unit, factor.unit), columns
+                           quantity.unit, factor.unit, float(at[1] - at[0]), found.spread)
     return best
-
-
-def cross_validated(evidence: InputEvidence, answers: Sequence[FloatArray]) -> float | None:
-    """
-    Return what a law takes off what is left of each test, as a share, fitted to the others.
-
-    `answers` of each test are those to the law's k values, shape (n c, k). None with one test.
-    """
-    ends = np.cumsum([len(item) for item in answers])
-    tests = [slice(end - len(item), end) for end, item in zip(ends.tolist(), answers, strict=True)]
-    if len(tests) < 2:
-        return None
-    same = np.tile(np.eye(answers[0].shape[1]), (len(tests), 1))
-    before = after = 0.0
-    for k, rows in enumerate(tests):
-        others, own = evidence.during([*tests[:k], *tests[k + 1:]]), evidence.during([rows])
-        (square, slope), (own_square, own_slope) = (
-            (same.T @ whole @ same, same.T @ side)
-            for whole, side in (part.reduced(answers) for part in (others, own)))
-        size = max(float(np.trace(square)) / len(square), 1e-30)
-        values = others.weighed(square, slope, size).factors
-        before += own.energy
-        after += own.energy - float(values @ (2.0 * own_slope - own_square @ values))
-    return 1.0 - after / before if before > 0.0 else None
 
 
 def _hats(values: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -8,8 +8,8 @@ from collections.abc import Iterator
 
 import numpy as np
 from simgap.machine.contract import FloatArray
+from simgap.machine.with_law import Law
 from simgap.settings import DEFAULT
-from simgap.verdict.law import Law
 from simgap.verdict.spoken import quantity
 
 # Rates and widths that are tried, as shares of the greatest value of the quantity.

@@ -3,7 +3,6 @@
 """Where a gap lies: parts (of the effects, or of an unknown input), signals and regimes."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -36,8 +35,7 @@ def of_the_unknown(problem: LeastSquares, none: FitState,
                    parts: Mapping[str, float]) -> list[Located]:
     """Return where something lies that no effect names, given how likely each part is."""
     # what slow noise could pass for is judged as it was read
-    read = LeastSquares(problem.machine.with_experiments(
-        [replace(e, colours=()) for e in problem.experiments]), settings=problem.settings)
+    read = problem.as_stated()
     gaps = np.where(read.valid, read.residuals(none.point()), 1.0)
     found = _located(problem, parts, lambda k: gaps[read.rows(k)].reshape(
         problem.experiments[k].measured.shape) ** 2 - 1.0)

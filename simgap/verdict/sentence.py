@@ -7,11 +7,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple, TYPE_CHECKING
 
+from simgap.machine.with_law import Law
 from simgap.next_test.design import objective_for, SEPARATE
 from simgap.next_test.rivals import Findings
 from simgap.settings import DEFAULT
 from simgap.verdict.intervals import jackknife, TWO_SIDED_95
-from simgap.verdict.law import Law
 from simgap.verdict.law_form import nearest_form
 from simgap.verdict.reproducibility import contradictions
 from simgap.verdict.spoken import percent, quantity, size, with_interval
@@ -198,9 +198,9 @@ def _law(law: Law) -> str:
     if law.withheld is None:
         return f'{text}.'
     if law.withheld <= 0.0:
-        return f'{text}; fitted to the other recordings it takes nothing off what is left of one.'
-    return (f'{text}; fitted to the other recordings it takes {percent(law.withheld)} off what is '
-            'left of one.')
+        return f'{text}; it closes nothing of the gap of a recording that was not fitted.'
+    return (f'{text}; it closes {percent(law.withheld)} of the gap of recordings that were not '
+            'fitted.')
 
 
 def _when(verdict: Verdict) -> Iterator[str]:

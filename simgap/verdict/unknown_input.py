@@ -11,8 +11,9 @@ import numpy as np
 from simgap.fit.least_squares import LeastSquares
 from simgap.machine.contract import DisturbanceInput, FloatArray
 from simgap.machine.pulses import answers
+from simgap.machine.with_law import Law
 from simgap.verdict.input_evidence import InputEvidence
-from simgap.verdict.law import cross_validated, Law, likeliest, quantities_of
+from simgap.verdict.law import likeliest, quantities_of
 
 # Times within which an input changes, in pulses.
 _SMOOTH = (0.0, 5.0)
@@ -31,50 +32,53 @@ class Place:
     law: Law | None = None  # the likeliest one of an input there
 
 
-def places(problem: LeastSquares, point: Mapping[str, float]) -> list[Place]:
-    """Return where an unknown input may act, the likeliest first; `point` is of the nuisances."""
-    evidence, channels = InputEvidence.at(problem, point), problem.experiments[0].channels
+def places(problem: LeastSquares, point: Mapping[str, float],
+           plain: LeastSquares | None = None) -> list[Place]:
+    """
+    Return where an unknown input may act, the likeliest first; `point` is of the nuisances.
+
+    A law is sought in `plain`, whose noise is that which is stated, because a slow gap may pass
+    for noise; none is sought without it.
+    """
+    evidence = InputEvidence.at(problem, point)
+    for_laws = InputEvidence.at(plain, point) if plain else None
     quantities = quantities_of(problem, point)
     found = []
-    answers_of_laws: dict[str, list[FloatArray]] = {}
 
     def judged(place: DisturbanceInput, responses: Sequence[FloatArray],
                peaks: Sequence[FloatArray], smooth: Sequence[float]) -> None:
-        square, slope = evidence.reduced(responses)
-        counts = [moments.size for moments in peaks]
-        weighed, share, _ = evidence.of_course(square, slope, counts, smooth)
-        law = None
-        if likely := likeliest(evidence, square, slope, {
-                name: replace(quantity, values=[
-                    np.interp(moments, e.time, own) for moments, e, own in zip(
-                        peaks, problem.experiments, quantity.values, strict=True)])
-                for name, quantity in quantities.items()}):
-            law = likely[0].in_units(place.size, place.unit)
-            answers_of_laws[place.name] = [own @ part for own, part in zip(
-                responses, np.split(likely[1], np.cumsum(counts)[:-1]), strict=True)]
-            weighed = max(weighed, law.evidence)
+        weighed, share, _ = evidence.of_course(
+            *evidence.reduced(_seen(problem, responses)), [own.size for own in peaks], smooth)
+        law = likeliest(for_laws, *for_laws.reduced(_seen(plain, responses)), {
+            name: replace(quantity, values=[
+                np.interp(moments, e.time, own) for moments, e, own in zip(
+                    peaks, problem.experiments, quantity.values, strict=True)])
+            for name, quantity in quantities.items()}) if plain and for_laws else None
         found.append((share, Place(place.name, place.component, weighed, evidence.net(weighed),
-                                   law)))
+                                   law.in_units(place.size, place.unit) if law else None)))
 
     for place in problem.machine.disturbance_inputs:
         judged(place, *_columns(problem, point, place), _SMOOTH)
-    for c, channel in enumerate(channels):
-        reading = DisturbanceInput(
-            f'reading of {channel}', channel, unit=problem.experiments[0].units[c],
-            size=float(np.median(np.concatenate([e.noise[:, c] for e in problem.experiments]))))
+    readings = readings_of(problem)
+    for c, reading in enumerate(readings):
         judged(reading, *_of_reading(problem, c, reading.size), (0.0,))
     # what repeats itself too fast for a pulse, such as a hum, lies in its reading
     most = 2.0 * max(share for share, _ in found)
-    for c, channel in enumerate(channels):
+    for c, reading in enumerate(readings):
         weighed, share = evidence.repeated(c, problem)
         if share > most:
-            found.append((share, Place(f'reading of {channel}', channel, weighed,
+            found.append((share, Place(reading.name, reading.component, weighed,
                                        evidence.net(weighed))))
-    first, *others = sorted((place for _, place in found), key=lambda place: -place.evidence)
-    if first.law:
-        first = replace(first, law=replace(first.law, withheld=cross_validated(
-            evidence, answers_of_laws[first.name])))
-    return [first, *others]
+    return sorted((place for _, place in found), key=lambda place: -place.evidence)
+
+
+def readings_of(problem: LeastSquares) -> list[DisturbanceInput]:
+    """Return the readings as places where an unknown input may act."""
+    first = problem.experiments[0]
+    return [DisturbanceInput(
+        f'reading of {channel}', channel, unit=first.units[c],
+        size=float(np.median(np.concatenate([e.noise[:, c] for e in problem.experiments]))))
+        for c, channel in enumerate(first.channels)]
 
 
 def courses(problem: LeastSquares, point: Mapping[str, float],
@@ -83,18 +87,24 @@ def courses(problem: LeastSquares, point: Mapping[str, float],
     evidence = InputEvidence.at(problem, point)
     responses, times = _columns(problem, point, place)
     counts = [moments.size for moments in times]
-    _, _, heights = evidence.of_course(*evidence.reduced(responses), counts, _SMOOTH)
+    _, _, heights = evidence.of_course(
+        *evidence.reduced(_seen(problem, responses)), counts, _SMOOTH)
     return list(zip(times, np.split(heights, np.cumsum(counts)[:-1]), strict=True))
 
 
 def _columns(problem: LeastSquares, point: Mapping[str, float],
              place: DisturbanceInput) -> tuple[list[FloatArray], list[FloatArray]]:
     """Return the answers to heights at a place, and when these are [s]."""
-    # Both are for each experiment; answers have the shape (n c, heights), times (heights,).
+    # Both are for each experiment; answers have the shape (n, c, heights), times (heights,).
     found = answers(problem.machine, dict(point), place)
-    return ([problem.whitened(k, own.summed(np.eye(own.times.size), e.time.size))
-             for k, (own, e) in enumerate(zip(found, problem.experiments, strict=True))],
+    return ([own.summed(np.eye(own.times.size), e.time.size)
+             for own, e in zip(found, problem.experiments, strict=True)],
             [own.times for own in found])
+
+
+def _seen(problem: LeastSquares, responses: Sequence[FloatArray]) -> list[FloatArray]:
+    """Return changes of readings as the residuals of a problem have them, shape (n c, m) each."""
+    return [problem.whitened(k, own) for k, own in enumerate(responses)]
 
 
 def components(found: Sequence[Place], caution: float) -> dict[str, float]:
@@ -121,6 +131,6 @@ def _of_reading(problem: LeastSquares, channel: int,
         pulses = np.zeros((*experiment.measured.shape, moments.size))
         pulses[:, channel] = size * np.maximum(
             0.0, 1.0 - np.abs(time[:, np.newaxis] - moments) / rise)
-        responses.append(problem.whitened(k, pulses))
+        responses.append(pulses)
         peaks.append(moments)
     return responses, peaks

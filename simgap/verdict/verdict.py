@@ -44,10 +44,15 @@ class Decision:
     confusable: Sequence[Sequence[str]]  # groups that data cannot tell apart
 
 
-def decide(found: Found, places: Sequence[Place], enough: bool) -> Decision:
-    """Conclude from a search, what an unknown input would explain, and whether data suffice."""
+def decide(found: Found, places: Sequence[Place], gained: float, enough: bool) -> Decision:
+    """
+    Conclude from a search and what an unknown input would explain.
+
+    gained : evidence for a law beyond that for the best hypothesis; 0 without a law
+    enough : whether data suffice
+    """
     settings = found.problem.settings.verdict
-    unknown = unknown_probability(found, places)
+    unknown = unknown_probability(found, places, gained)
     answers = ranked(found, unknown)
     top = answers[0]
     if unknown > top.probability:
@@ -73,22 +78,15 @@ def ranked(found: Found, unknown: float) -> list[Answer]:
     return sorted(answers.values(), key=lambda answer: -answer.probability)
 
 
-def unknown_probability(found: Found, places: Sequence[Place]) -> float:
+def unknown_probability(found: Found, places: Sequence[Place], gained: float) -> float:
     """Return the probability that something outside the catalogue is at work."""
     settings = found.problem.settings.verdict
     # of the whole gap, because the form of a named effect errs in proportion to what it does
     explained = max((place.explained for place in places), default=0.0) * (
         0.5 * found.evidence.samples / found.evidence.whole)
     beyond = math.log(max(explained, 1e-9) / settings.left) / settings.left_width
-    share = 0.5 * (1.0 + math.tanh(0.5 * max(beyond, beyond_price(found, places))))
+    share = 0.5 * (1.0 + math.tanh(0.5 * max(beyond, gained or -math.inf)))
     return settings.least_unknown + (settings.most_unknown - settings.least_unknown) * share
-
-
-def beyond_price(found: Found, places: Sequence[Place]) -> float:
-    """Return by how much the likeliest law gains more than it has to pay."""
-    settings = found.evidence.settings
-    return max((place.law.evidence for place in places if place.law), default=0.0) - (
-        settings.shows + settings.form_error ** 2 * found.evidence.whole)
 
 
 def confusable(found: Found) -> list[list[str]]:

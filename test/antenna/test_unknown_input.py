@@ -36,7 +36,7 @@ def disturbed(place_name: str, strength: float, seed: int, fastest: float = 1.5)
         return np.asarray(strength * waves.sum(axis=-1))
 
     place = next(e for e in model.disturbance_inputs if e.name == place_name)
-    readings = model.simulate_disturbed({}, place, course)[0]
+    readings = model.simulate_disturbed({}, place, [course])[0]
     readings = readings + NOISE * random.normal(size=readings.shape)
     time = model.experiments[0].time
     command = test['test_signal/rate_command']

@@ -334,9 +334,9 @@ class Windy(Lever):
         return getattr(self, '_coarse', self)
 
     def simulate_disturbed(self, point: Point, place: DisturbanceInput,
-                           course: Course) -> list[FloatArray]:
+                           courses: Sequence[Course]) -> list[FloatArray]:
         self._seen.append(place.name)
-        return [self.predict(point, 0) + course(self.experiments[0].time)[:, np.newaxis]]
+        return [self.predict(point, 0) + courses[0](self.experiments[0].time)[:, np.newaxis]]
 
 
 def test_a_test_is_judged_in_the_wind_of_every_day_which_is_simulated_once() -> None:

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What acts every day: its pattern where a machine is linear, and that there is none elsewhere."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -25,10 +26,10 @@ class Hunting(Pushed):
     """The same, whose left reading is a wave of which a little force decides the phase."""
 
     def simulate_disturbed(self, point: Point, place: DisturbanceInput,
-                           course: Course) -> list[FloatArray]:
+                           courses: Sequence[Course]) -> list[FloatArray]:
         """Return both readings with a force."""
         readings = self.predict(point, 0)
-        readings[:, 0] = self._wave(30.0 * np.cumsum(course(TIME)) * TIME[1])
+        readings[:, 0] = self._wave(30.0 * np.cumsum(courses[0](TIME)) * TIME[1])
         return [readings]
 
     def predict(self, point: Point, experiment: int) -> FloatArray:

@@ -10,9 +10,9 @@ from typing import Any
 
 import pytest
 from simgap.machine.contract import Effect, Form, Parameter
+from simgap.machine.with_law import Law
 from simgap.next_test.design import objective_for, SEPARATE
 from simgap.next_test.rivals import Findings
-from simgap.verdict.law import Law
 from simgap.verdict.record import Named
 from simgap.verdict.sentence import headline, said
 from simgap.verdict.spoken import number, percent
@@ -143,7 +143,7 @@ def test_agreement_is_not_said_beside_a_remainder_that_is_louder_than_noise() ->
 def test_unknown_says_place_size_and_when_and_what_would_settle_it() -> None:
     place = SimpleNamespace(name='force on the carriage', component='carriage', explained=0.83,
                             law=Law('angle', 'load', 31.0, (0.0, 1.0, 2.0), (0.5, 0.0, -2.0),
-                                    (0.1, 0.1, 0.1), 'rad', 'N/A', 0.4))
+                                    (0.1, 0.1, 0.1), 'rad', 'N/A', 1.0, 1.0, 0.4))
     found = said(verdict(
         'unknown_effect', Named(['unknown'], 0.9, {}), may_enter_at=[place],
         where=[{'component': 'carriage', 'signal': 'angle', 'regime': 'reversal', 'share': 0.6}],
@@ -155,8 +155,8 @@ def test_unknown_says_place_size_and_when_and_what_would_settle_it() -> None:
         'angle (reversal). The model misses angle by 0.0432 rad rms. As force on the carriage it '
         'could explain 83 percent of the gap, best as a function of angle, in proportion to load. '
         'It goes from 0.5 N/A at 0 rad to -2 N/A at 2 rad, most like a parabola, which lacks less '
-        'than 0.1 percent of it; fitted to the other recordings it takes 40 percent off what is '
-        'left of one.')
+        'than 0.1 percent of it; it closes 40 percent of the gap of recordings that were not '
+        'fitted.')
     assert 'one test is not enough' in found.then and '`propose`' in found.then
 
 

@@ -84,7 +84,7 @@ def test_a_log_may_begin_at_any_time(folder: Path) -> None:
 
 def test_a_push_enters(folder: Path) -> None:
     machine = machine_of(folder)
-    pushed = machine.simulate_disturbed({}, machine.disturbance_inputs[0], np.ones_like)[0]
+    pushed = machine.simulate_disturbed({}, machine.disturbance_inputs[0], [np.ones_like])[0]
     assert np.abs(pushed - machine.predict({}, 0)).max() > 1e-3
 
 

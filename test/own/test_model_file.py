@@ -141,7 +141,7 @@ def test_an_input_is_held_and_late(tmp_path: Path, stand_in: list[StandIn]) -> N
 def test_a_push_is_fed_in(tmp_path: Path, stand_in: list[StandIn]) -> None:
     machine = machine_of(tmp_path, TEXT.replace('from: force,', 'from: load,'))
     place, = machine.disturbance_inputs
-    found = machine.simulate_disturbed({}, place, lambda time: time)[0]
+    found = machine.simulate_disturbed({}, place, [lambda time: time])[0]
     np.testing.assert_allclose(found[:, 1], 2.0 * LOG.time)
 
 

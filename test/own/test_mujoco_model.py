@@ -88,7 +88,7 @@ def test_inputs_and_pushes_turn_it(tmp_path: Path) -> None:
     machine = machine_of(tmp_path, log)
     moved = 0.1 + free_course(log.time - 5.0, 0.2, 0.4, 8.0, 2.0)[0]
     np.testing.assert_allclose(machine.predict({}, 0)[:, 0], moved, atol=2e-8)
-    pushed = machine.simulate_disturbed({}, machine.disturbance_inputs[0], np.ones_like)[0]
+    pushed = machine.simulate_disturbed({}, machine.disturbance_inputs[0], [np.ones_like])[0]
     moved = 0.2 + free_course(log.time - 5.0, 0.1, 0.4, 8.0, 2.0)[0]
     np.testing.assert_allclose(pushed[:, 0], moved, atol=2e-8)
 

@@ -6,8 +6,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from simgap.machine.with_law import Law
 from simgap.report.law_picture import picture
-from simgap.verdict.law import Law
 
 AT, VALUES, DEVIATIONS = (-2.0, 0.0, 1.0, 4.0), (-3.0, 0.0, 1.0, 5.0), (0.5, 0.0, 0.25, 1.0)
 
@@ -18,7 +18,7 @@ def read(points: str) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
 
 
 def test_the_curve_and_its_band_are_read_back_from_the_edges() -> None:
-    found = picture(Law('rate', '', 9.0, AT, VALUES, DEVIATIONS, 'rad/s', 'N'))
+    found = picture(Law('rate', '', 9.0, AT, VALUES, DEVIATIONS, 'rad/s', 'N', 1.0, 1.0))
     width, height = found['box']
     low, high = float(found['low']), float(found['high'])
     assert (low, high, found['begin'], found['end']) == (-4.0, 7.0, '-2', '4')

@@ -19,8 +19,8 @@ import numpy as np
 import pytest
 from simgap.machine.contract import Effect, Excerpt, Experiment, Form, Parameter
 from simgap.machine.diagram import Diagram, DiagramBlock
+from simgap.machine.with_law import Law
 from simgap.report.page import contents
-from simgap.verdict.law import Law
 from simgap.verdict.record import Named, Verdict
 from simgap.verdict.unknown_input import Place
 
@@ -89,7 +89,8 @@ def diagnosis(result: dict[str, Any], read: Sequence[int] = (1,), **machine: Any
         'word': result['verdict'], 'which': [Named(**answer) for answer in result['which']],
         'may_enter_at': [
             Place(place['name'], place['component'], 1.0, place['explained'],
-                  Law(evidence=1.0, at=(-1.0, 0.0, 3.0), values=(-0.5, 0.0, 1.5),
+                  Law(evidence=1.0, width=1.0, spread=1.0, at=(-1.0, 0.0, 3.0),
+                      values=(-0.5, 0.0, 1.5),
                       deviations=(0.1, 0.0, 0.25), by_unit='rad/s', unit=HOSTILE,
                       **place['law']))
             for place in result['may_enter_at']],

@@ -1,0 +1,101 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+A law as a hypothesis: it acts in the simulation, and is judged as an effect of the catalogue is.
+
+It is fitted beside all that the best hypothesis has, at noise that is white, because slow noise
+takes a gap for its own. Then both are compared at the noise that the better of them leaves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from simgap.fit.least_squares import LeastSquares
+from simgap.fit.noise import with_noise_left
+from simgap.machine.contract import FloatArray
+from simgap.machine.with_law import Law, WithLaw
+from simgap.search import moves
+from simgap.search.evidence import Evidence
+from simgap.search.hypothesis import Hypothesis
+from simgap.search.screening import Sensitivity
+from simgap.search.search import Found
+from simgap.verdict.held_out import held_out
+from simgap.verdict.law import quantities_of, REACHED
+from simgap.verdict.unknown_input import Place, readings_of
+
+# A law moves the machine, and so what it is a function of.
+_ROUNDS = 2
+
+
+@dataclass(frozen=True)
+class LawfulFit:
+    """The likeliest law beside the best hypothesis, and how much more it makes likely."""
+
+    place: Place  # with the law as it was fitted
+    gained: float  # evidence beyond that of the best of the catalogue, with the law's price
+
+
+def lawful_fit(found: Found, places: Sequence[Place], threads: int = 1) -> LawfulFit | None:
+    """Return the likeliest law of all places, in the fit; None if none promises its price."""
+    place = max((place for place in places if place.law),
+                key=lambda place: place.law.evidence if place.law else 0.0, default=None)
+    if place is None or place.law is None:
+        return None
+    base, problem = found.best, found.problem.as_stated()
+    level = problem.noise_level(problem.residuals(base.state.point()))
+    problem = problem.at_scale(max(level, 1.0))
+    begun = replace(base, state=problem.start(base.state.parameters, base.state.point()))
+    machine, law = _added(problem, begun, place, place.law)
+    settings = problem.settings
+    # at the noise that the law leaves, all are compared
+    problem = LeastSquares(with_noise_left(
+        machine, law.state.point(), settings.noise, settings.noise.greatest_level),
+        settings=settings)
+    law = replace(law, state=problem.fit(problem.start(
+        law.state.parameters, law.state.point()), settings.search.iterations))
+    slopes = law.state.jacobian[:, :len(problem.machine.nuisances)]
+    rivals = [moves.refitted(problem, h, law, slopes) for h in {id(h): h for h in (
+        base, found.none)}.values()]
+    evidence = Evidence.among(problem, [law, *rivals])
+    rival = max(rivals, key=evidence)
+    gained = evidence(law) - evidence(rival)
+    withheld = None
+    if gained > 0.0:
+        withheld = held_out(problem, rivals[-1], law, threads)['explained_fraction']['value']
+    return LawfulFit(replace(
+        place, evidence=max(gained, 0.0), explained=max(1.0 - law.cost / rival.cost, 0.0),
+        law=_as_fitted(place.law, law, machine.reached, gained, withheld)), gained)
+
+
+def _added(problem: LeastSquares, base: Hypothesis, place: Place,
+           law: Law) -> tuple[WithLaw, Hypothesis]:
+    """Return a machine that knows a law, and a hypothesis with it beside what another has."""
+    source = next(item for item in (*problem.machine.disturbance_inputs, *readings_of(problem))
+                  if item.name == place.name)
+    effect, found, lawful = law.as_effect(source), base, problem
+    item = Sensitivity(effect.id, effect.forms[0], np.zeros((0, 0), np.float32))
+    point = item.form.start
+    for _ in range(_ROUNDS):
+        machine = WithLaw(problem.machine, effect, source, [
+            own / source.size for own in law.weights(quantities_of(lawful, found.state.point()))])
+        lawful = LeastSquares(machine, scale=problem.scale, settings=problem.settings)
+        found = moves.added(lawful, base, item, point)
+        point = found.state.point()
+    return machine, found
+
+
+def _as_fitted(law: Law, found: Hypothesis, reached: FloatArray, gained: float,
+               withheld: float | None) -> Law:
+    """Return a law as it was fitted, where the motion that it makes has reached it."""
+    state = found.state
+    spread = np.sqrt(np.diag(np.linalg.pinv(
+        state.hessian + np.diag([p.prior_sigma ** -2.0 if p.prior_sigma else 0.0
+                                 for p in state.parameters]), hermitian=True)).clip(0.0))
+    there = reached > REACHED * reached.max()
+    own = np.flatnonzero([p in found.forms[-1].parameters for p in state.parameters])[there]
+    return replace(law, evidence=gained, at=tuple(np.array(law.at)[there].tolist()),
+                   values=tuple(state.x[own].tolist()),
+                   deviations=tuple(spread[own].tolist()), withheld=withheld)
