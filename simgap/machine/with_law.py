@@ -51,13 +51,16 @@ class Law:
 
     def as_effect(self, place: DisturbanceInput) -> Effect:
         """Return the effect that it is at a place, whose sizes are its values."""
-        ident = f'{place.component}.law'
+        return Effect(f'{place.component}.law', place.component,
+                      f'{place.name} as a function of {self}',
+                      (self.as_form(f'{place.component}.law.'),))
+
+    def as_form(self, prefix: str = '') -> Form:
+        """Return its values as the sizes of a form."""
         most = _FARTHEST * max(self.spread, *map(abs, self.values))
-        return Effect(ident, place.component, f'{place.name} as a function of {self}', (Form(
-            str(self), tuple(Parameter(
-                f'{ident}.at {at:.6g}', self.unit, -most, most, 0.1 * self.spread, self.spread,
-                start=value) for at, value in zip(self.at, self.values, strict=True)),
-            scanned=True),))
+        return Form(str(self), tuple(Parameter(
+            f'{prefix}at {at:.6g}', self.unit, -most, most, 0.1 * self.spread, self.spread,
+            start=value) for at, value in zip(self.at, self.values, strict=True)), scanned=True)
 
     def in_units(self, size: float, unit: str) -> Law:
         """Return the law of an input, one of which is of a size in a unit."""

@@ -20,7 +20,6 @@ from simgap.machine.with_law import Law, WithLaw
 from simgap.search import moves
 from simgap.search.evidence import Evidence
 from simgap.search.hypothesis import Hypothesis
-from simgap.search.screening import Sensitivity
 from simgap.search.search import Found
 from simgap.verdict.held_out import held_out
 from simgap.verdict.law import quantities_of, REACHED
@@ -42,7 +41,8 @@ def lawful_fit(found: Found, places: Sequence[Place], threads: int = 1) -> Lawfu
     """Return the likeliest law of all places, in the fit; None if none promises its price."""
     place = max((place for place in places if place.law),
                 key=lambda place: place.law.evidence if place.law else 0.0, default=None)
-    if place is None or place.law is None:
+    if place is None or place.law is None or (
+            place.law.evidence < found.evidence.price([place.law.as_form()])):
         return None
     base, problem = found.best, found.problem.as_stated()
     level = problem.noise_level(problem.residuals(base.state.point()))
@@ -75,16 +75,20 @@ def _added(problem: LeastSquares, base: Hypothesis, place: Place,
     """Return a machine that knows a law, and a hypothesis with it beside what another has."""
     source = next(item for item in (*problem.machine.disturbance_inputs, *readings_of(problem))
                   if item.name == place.name)
-    effect, found, lawful = law.as_effect(source), base, problem
-    item = Sensitivity(effect.id, effect.forms[0], np.zeros((0, 0), np.float32))
-    point = item.form.start
+    effect, lawful, state = law.as_effect(source), problem, base.state
+    form = effect.forms[0]
+    numbers, point = form.parameters, {**state.point(), **form.start}
     for _ in range(_ROUNDS):
         machine = WithLaw(problem.machine, effect, source, [
-            own / source.size for own in law.weights(quantities_of(lawful, found.state.point()))])
+            own / source.size for own in law.weights(quantities_of(lawful, state.point()))])
         lawful = LeastSquares(machine, scale=problem.scale, settings=problem.settings)
-        found = moves.added(lawful, base, item, point)
-        point = found.state.point()
-    return machine, found
+        # one-sided: each difference runs all tests
+        columns = lawful.jacobian(point, numbers, lawful.residuals(point), central=False)
+        state = lawful.fit(lawful.start(
+            (*base.state.parameters, *numbers), point,
+            np.column_stack([base.state.jacobian, columns])), problem.settings.search.iterations)
+        point = state.point()
+    return machine, Hypothesis((*base.effects, effect.id), (*base.forms, form), state)
 
 
 def _as_fitted(law: Law, found: Hypothesis, reached: FloatArray, gained: float,
