@@ -1,0 +1,28 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""Enter simgap: `python -m lab.benchmark.methods.ours CASE`."""
+
+from pathlib import Path
+import sys
+
+from lab.benchmark.methods.case import CaseFolder
+from simgap.errors import UserError
+from simgap.model import diagnose_logs, OwnMachine
+
+
+def main(folder: str) -> None:
+    """Diagnose a case with a user's model, and predict its kept test."""
+    case = CaseFolder(Path(folder))
+    verdict = diagnose_logs(case.model, case.logs, threads=1)
+    data = verdict.as_data()
+    case.write(data['which'], **{key: data[key] for key in ('verdict', 'confusable', 'how_far')})
+    # numbers of a test that are its own are those of the first
+    machine = OwnMachine(case.model, case.logs)
+    case.predict(machine.numbers(verdict.best.state.point(), 0))
+
+
+if __name__ == '__main__':
+    try:
+        main(*sys.argv[1:])
+    except UserError as error:
+        sys.exit(str(error))
