@@ -109,7 +109,7 @@ def _joint(n: Numbers) -> tuple[str, str]:
         gear, phase = n['gear'], n['gravity_phase']
         arm = gear * n['gravity'] / (LINK_MASS * GRAVITY)
         bodies += ('    <body name="link"><joint name="link" type="hinge" axis="1 0 0"/>'
-                   f'<inertial pos="0 {arm * math.sin(phase):.9g} {arm * math.cos(phase):.9g}" '
+                   f'<inertial pos="0 {-arm * math.sin(phase):.9g} {arm * math.cos(phase):.9g}" '
                    f'mass="{LINK_MASS}" diaginertia="1e-12 1e-12 1e-12"/></body>\n')
         rest += (f'  <equality><joint joint1="link" joint2="load" polycoef="0 {1.0 / gear:.9g} '
                  f'0 0 0" {HARD}/></equality>\n')

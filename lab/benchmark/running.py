@@ -45,15 +45,14 @@ def simulate(name: str, n: Numbers, asked: FloatArray, start: float, begin: int,
     before, integral = digit * math.floor(_encoder(n, -1.0, start) / digit + 0.5), 0.0
     for k in range(asked.size):
         t = (k - begin) * TICK_S
-        position, rate = data.qpos[0], data.qvel[0]
-        read = _encoder(n, t, position)
+        read = _encoder(n, t, data.qpos[0])
         history[:, k] = read, min(max(data.act[0], -clips), clips)
         read = digit * math.floor(read / digit + 0.5)
         demand, integral = _DEMANDED(sheet, asked[k], read, before, integral)
         before = read
         if not (n.get('lost_every') and t % n['lost_every'] < n['lost_for']):
             data.ctrl[0] = demand
-        _follow(model, n, t, position, rate)
+        _follow(model, n, t, data)
         data.qfrc_applied[last_dof] = wind[k] + n.get('shake', 0.0) * math.sin(
             2.0 * math.pi * n.get('shake_hz', 0.0) * t)
         mujoco.mj_step(model, data, parts)
@@ -71,16 +70,17 @@ def _encoder(n: Numbers, t: float, position: float) -> float:
     return read
 
 
-def _follow(model: Any, n: Numbers, t: float, position: float, rate: float) -> None:
+def _follow(model: Any, n: Numbers, t: float, data: Any) -> None:
     """Set the numbers that follow time, direction and place until the next tick."""
     if n.get('warming'):
         lost = n['warming'] * (1.0 - math.exp(-max(t, 0.0) / n['warming_time']))
         model.actuator_gear[0, 0] = n['constant'] * (1.0 - lost)
     if not any(n.get(key) for key in ('asymmetry', 'slope', 'spot', 'brake')):
         return
-    # a smooth crossover, much narrower than any motion
-    side = math.tanh(rate / (1e-4 * n['rate_limit']))
-    level = n['coulomb'] * (1.0 + n.get('asymmetry', 0.0) * side)
+    position, rate = data.qpos[0], data.qvel[0]
+    # at rest the drive pulls one way
+    way = rate if abs(rate) > 1e-4 * n['rate_limit'] else data.qfrc_actuator[0]
+    level = n['coulomb'] * (1.0 + n.get('asymmetry', 0.0) * math.copysign(1.0, way))
     level *= max(1.0 + n.get('slope', 0.0) * position, 0.05)
     if n.get('spot'):
         away = (position - n['spot_at']) / n['spot_width']
