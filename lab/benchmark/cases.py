@@ -9,7 +9,6 @@ to test, wind, and a filter in the logger. A fourth test is kept back; its comma
 
 import json
 from pathlib import Path
-from typing import Any
 
 from lab.antenna.cases import Truth
 from lab.antenna.imperfections import coloured
@@ -106,20 +105,14 @@ def make_recording(truth: Truth, recording: int) -> dict[str, FloatArray]:
     return columns
 
 
-def sheet_of(truth: Truth) -> dict[str, Any]:
-    """Return what an entrant is told of a machine: its data sheet, and no word of the case."""
-    kind = kind_of(truth['machine'])
-    return {'machine': BENCHMARK[kind.name], 'sample_rate_hz': truth['sample_rate_hz'],
-            **{key: kind.table[key] for key in (
-                'columns', 'nominal', 'tolerances', 'noise', 'digits', 'zero', 'gain')},
-            'effects': sorted(kind.catalogue)}
-
-
 def write_task(folder: Path, truth: Truth) -> None:
     """Write what a case has beside its recordings: data sheet, base model, command kept back."""
     kind, rate = kind_of(truth['machine']), truth['sample_rate_hz']
-    (folder / SHEET).write_text(json.dumps(sheet_of(truth), indent=1) + '\n', encoding='utf-8')
     name = BENCHMARK[kind.name]
+    sheet = {'machine': name, 'sample_rate_hz': rate, 'effects': sorted(kind.catalogue), **{
+        key: kind.table[key] for key in (
+            'columns', 'nominal', 'tolerances', 'noise', 'digits', 'zero', 'gain')}}
+    (folder / SHEET).write_text(json.dumps(sheet, indent=1) + '\n', encoding='utf-8')
     (folder / f'{name}.xml').write_text(mjcf(name, kind.table['nominal']), encoding='utf-8')
     test = truth['tests'][-1]
     times = np.arange(int(round(rate * test['duration_s'])) + 1) / rate

@@ -60,10 +60,10 @@ def enter(folder: Path, command: Sequence[str], out: Path, limit: float, jobs: i
     manifest = sealing.read_manifest(folder)
     results = TrialResults(folder, manifest, out)
     complete(list(manifest['seals']), partial(sealing.open_truth, folder, manifest=manifest),
-             [Arm(lambda name, row: row.get('verdict') is None,
+             [Arm(lambda name, row: 'verdict' not in row,
                   partial(_entered, folder, command, limit))],
              results, jobs=jobs, threads=True, done=done)
-    return sum(results[name].get('verdict') is None for name in manifest['seals'])
+    return sum('verdict' not in results[name] for name in manifest['seals'])
 
 
 def _entered(folder: Path, command: Sequence[str], limit: float, truth: Truth) -> Row:
@@ -72,7 +72,7 @@ def _entered(folder: Path, command: Sequence[str], limit: float, truth: Truth) -
         case, said = Path(place) / truth['case'], Path(place) / 'said.txt'
         shutil.copytree(folder / truth['case'], case, ignore=shutil.ignore_patterns(
             TRUTH, batch.VERDICT, PREDICTED))
-        row: dict[str, Any] = {'verdict': None, 'closed': None, 'failure': ''}
+        row: dict[str, Any] = {'closed': None, 'failure': ''}
         row['seconds'] = round(_run([*command, str(case)], said, limit), 2)
         try:
             row['verdict'] = content_of(read_verdict(case / batch.VERDICT))
@@ -114,7 +114,7 @@ def answered(folder: Path, results: Path) -> list[Case]:
     found, cases = TrialResults(folder, manifest, results), []
     for name in found:
         row, verdict = found[name], None
-        if row.get('verdict') is not None:
+        if 'verdict' in row:
             try:
                 verdict = parse_verdict({**row['verdict'], 'seconds': row.get('seconds')})
             except VerdictError as error:

@@ -4,16 +4,8 @@
 Put any method beside others, on machines that another's program simulates.
 
 A method is a command: it gets the folder of a case and writes verdict.json into it. The whole
-task, for somebody who knows none of this code, is lab/benchmark/README.md. MuJoCo simulates the
-machines (pip install mujoco); each has an effect of its data sheet's list, two, none, or one that
-no list has.
-
-  --make N      seal N truths in DIR, then record the cases; --practice puts each truth into its
-                case, and draws other cases than any sealed set
-  --entry CMD   run CMD on each case of DIR; verdicts go to a file, and the same command goes on
-                after a stop and tries again what failed
-  --score DIR   print the table of all files of results, with intervals, and compare them by pairs
-
+task, for somebody who knows none of this code, is lab/benchmark/README.md. Making cases needs
+MuJoCo (pip install mujoco). The same --entry goes on after a stop, and tries again what failed.
 Exit code 1: a case has no verdict.
 
 For example:
@@ -47,9 +39,10 @@ COLUMNS = {'top-1 single': 'top1', 'pairs': 'pairs_both', 'healthy': 'no_gap_on_
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options of `lab benchmark`."""
     what = parser.add_mutually_exclusive_group(required=True)
-    what.add_argument('--make', type=int, metavar='N', help='make N cases')
+    what.add_argument('--make', type=int, metavar='N', help='seal N truths, then record the cases')
     what.add_argument('--entry', metavar='CMD', help='run a command on each case')
-    what.add_argument('--score', type=Path, metavar='DIR', help='score results on these cases')
+    what.add_argument('--score', type=Path, metavar='DIR',
+                      help='print the table of all results on these cases, and compare them')
     parser.add_argument('results', type=Path, nargs='*', metavar='FILE',
                         help='with --score: results of methods (.jsonl)')
     parser.add_argument('--seed', type=int, metavar='S', help='with --make: seed of the cases')
@@ -58,8 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--practice', action='store_true',
                         help='with --make: cases to practise on, with their truths')
     parser.add_argument('--machine', action='append', choices=sorted(BENCHMARK.values()),
-                        help='with --make: machine of the cases (default: joint); several take '
-                             'turns')
+                        help='with --make: default joint; several take turns')
     parser.add_argument('--cases', type=Path, metavar='DIR', help='with --entry: the cases')
     parser.add_argument('--time-limit', type=float, default=1800.0, metavar='S',
                         help='with --entry: for one case [s] (default %(default)g)')
@@ -84,7 +76,7 @@ def run(arguments: argparse.Namespace) -> int:
     if len(methods) < len(arguments.results):
         raise UserError('--score: two files have one name; a name stands for a method')
     found = entries.table(methods)
-    give(found, arguments.json, '\n'.join([*_lines(found), *_paired(found)]))
+    give(found, arguments.json, '\n'.join(_lines(found)))
     return int(any(figures['failures'] for figures in found['methods'].values()))
 
 
@@ -129,19 +121,15 @@ def _lines(found: Mapping[str, Any]) -> list[str]:
         bounds = {**figures['ci95'], 'auroc_unknown': figures['auroc_ci95']}
         cells = ''.join(f'{_cell(figures[key], bounds.get(key)):>20}' for key in COLUMNS.values())
         lines.append(f'{name:<{width}}{figures["cases"]:>5} {cells}')
-    return lines
+    if found['pairs']:
+        lines += ['', 'right on the same cases']
+    return lines + [
+        f'{pair["names"][0]} and {pair["names"][1]}: both {pair["both"]} of {pair["cases"]}, '
+        f'only the first {pair["first"]}, only the second {pair["second"]}, p = {pair["p"]:.2g}'
+        for pair in found['pairs']]
 
 
 def _cell(value: float, bounds: tuple[float, float] | None) -> str:
     if not math.isfinite(value):
         return '-'
     return f'{value:.2f}' + (f' [{bounds[0]:.2f}, {bounds[1]:.2f}]' if bounds else '')
-
-
-def _paired(found: Mapping[str, Any]) -> list[str]:
-    if not found['pairs']:
-        return []
-    return ['', 'right on the same cases', *(
-        f'{pair["names"][0]} and {pair["names"][1]}: both {pair["both"]} of {pair["cases"]}, '
-        f'only the first {pair["first"]}, only the second {pair["second"]}, p = {pair["p"]:.2g}'
-        for pair in found['pairs'])]

@@ -80,7 +80,9 @@ class Kind:
     @property
     def model(self) -> str:
         """Return the model that diagnoses it, as `antenna-drive diagnose --model` takes it."""
-        return f'{MODELS / BENCHMARK.get(self.name, self.name)}.py:machine'
+        if self.name in BENCHMARK:
+            return f'{ROOM / "models.py"}:{BENCHMARK[self.name]}'
+        return f'{MODELS / self.name}.py:machine'
 
     def cause(self, key: str) -> Cause:
         """Return an effect of the catalogue or outside it."""

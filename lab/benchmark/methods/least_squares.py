@@ -25,10 +25,10 @@ from simgap.errors import UserError
 from simgap.machine.contract import Form, Parameter
 from simgap.model import OwnMachine
 
-SHARE = 0.1                 # of a sample that counts
+SHARE = 0.05                # of a sample that counts
 LEVEL, WIDTH = 1.7, 0.2     # rms over noise at which 'unknown' is as likely as not, and its width
 PARTNERS, BASES = 4, 2      # effects that are tried beside each of the best
-FIRST, LAST = 6, 20         # steps of a fit, and of the fits that lead
+FIRST, LAST = 8, 20         # steps of a fit, and of the fits that lead
 CLIP = 3.0                  # residuals beyond it count by their size, not its square
 
 
