@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 from simgap.model import (
-    effect, free, known, Log, machine as own_machine, Numbers, OneTest, push, reading, ripple, shape,
-    size, within, without_gaps,
+    effect, free, known, Log, machine as own_machine, Numbers, OneTest, push, reading, ripple,
+    shape, size, within, without_gaps,
 )
 from simgap.parts import compiled, friction, harmonics, loop, shaping
 from simgap.parts.friction import Friction
@@ -98,7 +98,8 @@ machine = own_machine(
           'current_lag': within(5e-4, 0.5, 's'),
           # the recorder asks one channel after the other
           'current_filter': known(0.0, 's'), 'coulomb_share': known(1.0),
-          'viscous_share': known(1.0), 'position_late': free(0.0, 1.0, 'sample'), 'current_late': free(0.0, 1.0, 'sample')},
+          'viscous_share': known(1.0), 'position_late': free(0.0, 1.0, 'sample'),
+          'current_late': free(0.0, 1.0, 'sample')},
     per_test={'start': free(-2.5e-4, 2.5e-4, 'm')},
     readings={'position': reading('m', noise=2e-6, model_error=5e-6, column='position_m'),
               'current': reading('A', noise=0.03, model_error=0.015, zero=0.02, gain=0.01,

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 from simgap.model import (
-    effect, form, free, known, machine as own_machine, Numbers, OneTest, push, reading, ripple, shape,
-    size, within, without_gaps,
+    effect, form, free, known, machine as own_machine, Numbers, OneTest, push, reading, ripple,
+    shape, size, within, without_gaps,
 )
 from simgap.parts import compiled, coupling, friction, harmonics, loop, shaping, wave
 from simgap.parts.friction import Friction
@@ -102,7 +102,8 @@ machine = own_machine(
           'viscous': within(8e-4, 0.4, 'N m s/rad'), 'current_lag': within(5e-4, 0.5, 's'),
           # the recorder asks one channel after the other
           'current_filter': known(0.0, 's'), 'coulomb_share': known(1.0),
-          'viscous_share': known(1.0), 'angle_late': free(0.0, 1.0, 'sample'), 'current_late': free(0.0, 1.0, 'sample')},
+          'viscous_share': known(1.0), 'angle_late': free(0.0, 1.0, 'sample'),
+          'current_late': free(0.0, 1.0, 'sample')},
     per_test={'start': free(-0.05, 0.05, 'rad'), 'integral': free(-0.6, 0.6, 'A')},
     readings={'angle': reading('rad', noise=1e-3, model_error=2e-3, column='motor_rad'),
               'current': reading('A', noise=0.02, model_error=0.01, zero=0.02, gain=0.01,
