@@ -49,8 +49,7 @@ def asked_at_ticks(asked: FloatArray, ticks: int, begin: int) -> FloatArray:
     """
     Return what the controller is asked for at each tick, shape (begin + (n - 1) ticks + 1,).
 
-    The bus sends `asked`, shape (n,), every `ticks`; the drive goes from one to the next while it
-    waits for the one after. The first holds for `begin` ticks before.
+    The bus sends `asked`, shape (n,), every `ticks`; the first holds for `begin` ticks before.
     """
     moments = np.arange((asked.size - 1) * ticks + 1)
     late = np.maximum((moments - 1) // ticks, 0)
@@ -108,8 +107,7 @@ def make_recording(truth: Truth, recording: int) -> dict[str, FloatArray]:
 def write_task(folder: Path, truth: Truth) -> None:
     """Write what a case has beside its recordings: data sheet, base model, command kept back."""
     kind, rate = kind_of(truth['machine']), truth['sample_rate_hz']
-    name = BENCHMARK[kind.name]
-    sheet = {'machine': name, 'sample_rate_hz': rate, 'effects': sorted(kind.catalogue), **{
+    sheet = {'machine': (name := BENCHMARK[kind.name]), 'sample_rate_hz': rate, 'effects': sorted(kind.catalogue), **{
         key: kind.table[key] for key in (
             'columns', 'nominal', 'tolerances', 'noise', 'digits', 'zero', 'gain')}}
     (folder / SHEET).write_text(json.dumps(sheet, indent=1) + '\n', encoding='utf-8')

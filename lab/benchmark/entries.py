@@ -33,8 +33,7 @@ import numpy as np
 from scipy.stats import binomtest
 from simgap.errors import UserError
 
-PREDICTED = 'predicted.csv'
-TRUTH = 'truth.json'        # of a practice case
+PREDICTED, TRUTH = 'predicted.csv', 'truth.json'    # the truth of a practice case
 RESAMPLED = 1000            # times, for the interval of an AUROC
 
 
@@ -52,11 +51,7 @@ def make(folder: Path, count: int, seed: int, machines: Sequence[str], practice:
 
 def enter(folder: Path, command: Sequence[str], out: Path, limit: float, jobs: int,
           done: Done) -> int:
-    """
-    Let a command diagnose each case that `out` has no verdict of; return how many failed.
-
-    It may take `limit` [s]. The seconds that count are those of processors, its children's too.
-    """
+    """Let a command, for `limit` [s], answer what `out` has no verdict of; return the failures."""
     manifest = sealing.read_manifest(folder)
     results = TrialResults(folder, manifest, out)
     complete(list(manifest['seals']), partial(sealing.open_truth, folder, manifest=manifest),
@@ -89,7 +84,7 @@ def _entered(folder: Path, command: Sequence[str], limit: float, truth: Truth) -
 
 
 def _run(command: Sequence[str], said: Path, limit: float) -> float:
-    """Run a command for `limit` [s] at most; return its seconds of processor."""
+    """Run a command for `limit` [s] at most; return the seconds of processors that it took."""
     with open(said, 'wb') as stream:
         try:
             process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=stream,
@@ -127,35 +122,33 @@ def answered(folder: Path, results: Path) -> list[Case]:
 
 def table(methods: Mapping[str, Sequence[Case]]) -> dict[str, Any]:
     """
-    Return the figures of each method, and what two of them say of the same cases.
+    Return the scores of each method, with `auroc_ci95`, and `pairs`: two on the same cases.
 
-    `methods` has for each name the scores of `lab.trials.scorecard.score`, and `auroc_ci95`;
-    `pairs` has for two names how many cases `both` have right, `first` alone and `second` alone,
-    and `p`, of an exact test of McNemar (Psychometrika 12, 1947).
+    A pair has how many `both` have right, `first` alone and `second` alone, and `p`, of an exact
+    test of McNemar (Psychometrika 12, 1947).
     """
     figures = {name: {**score(cases), 'auroc_ci95': _auroc_interval(cases)}
                for name, cases in methods.items()}
     pairs = []
     for one, other in combinations(methods, 2):
         right = {case.truth['case']: case.right for case in methods[one]}
-        both = [(right[case.truth['case']], case.right) for case in methods[other]
+        seen = [(right[case.truth['case']], case.right) for case in methods[other]
                 if case.truth['case'] in right]
-        alone = both.count((True, False)), both.count((False, True))
-        pairs.append({'names': [one, other], 'cases': len(both), 'both': both.count((True, True)),
-                      'first': alone[0], 'second': alone[1],
-                      'p': float(binomtest(alone[0], sum(alone)).pvalue) if any(alone) else 1.0})
+        both, first, second = map(seen.count, ((True, True), (True, False), (False, True)))
+        p = float(binomtest(first, first + second).pvalue) if first + second else 1.0
+        pairs.append({'names': [one, other], 'cases': len(seen), 'both': both, 'first': first,
+                      'second': second, 'p': p})
     return {'methods': figures, 'pairs': pairs}
 
 
 def _auroc_interval(cases: Sequence[Case]) -> tuple[float, float]:
     """Return the 95 percent interval of unknown's AUROC, by cases drawn again; or nan."""
-    outside, known = (np.array([case.verdict.probability_of(UNKNOWN) for case in cases
-                                if case.verdict and (case.kind == 'outside') == side])
-                      for side in (True, False))
-    if not outside.size or not known.size:
+    groups = [[case.verdict.probability_of(UNKNOWN) for case in cases
+               if case.verdict and (case.kind == 'outside') == side] for side in (True, False)]
+    if not all(groups):
         return math.nan, math.nan
     random = np.random.default_rng(0)
-    drawn = [auroc(random.choice(outside, outside.size).tolist(),
-                   random.choice(known, known.size).tolist()) for _ in range(RESAMPLED)]
+    drawn = [auroc(*(random.choice(group, len(group)).tolist() for group in groups))
+             for _ in range(RESAMPLED)]
     low, high = np.quantile(drawn, (0.025, 0.975))
     return float(low), float(high)

@@ -14,11 +14,7 @@ import math
 STEP_S = 2.5e-4         # of MuJoCo's integrator
 # MuJoCo's stiffest dry friction at this step; its default lets a joint creep under load.
 STIFF = 'solreffriction="0.001 1" solimpfriction="0.999 0.999 1"'
-HARD = 'solref="0.001 1" solimp="0.999 0.999 1"'
-LINK_MASS = 20.0        # [kg]; so heavy that its arm, and with it its inertia, is small
-GRAVITY = 9.81
-# What turns is all armature. A slide needs its mass: MuJoCo weighs dry friction by it.
-_TINY = '<inertial pos="0 0 0" mass="{mass:.9g}" diaginertia="1e-12 1e-12 1e-12"/>'
+LINK_MASS, GRAVITY = 20.0, 9.81     # [kg], so heavy that arm and inertia are small; [m/s^2]
 Numbers = Mapping[str, float]
 
 
@@ -31,12 +27,10 @@ def mjcf(name: str, n: Numbers) -> str:
 
 
 def _body(name: str, kind: str, inertia: float, words: str, inner: str = '') -> str:
-    """Return a body on one joint: an armature that turns, or a mass that slides."""
-    turns = kind == 'hinge'
-    armature = f'armature="{inertia:.9g}" ' if turns else ''
+    """Return a body on one joint, a hinge or a slide, whose centre lies on its axis."""
     return (f'    <body name="{name}">\n      <joint name="{name}" type="{kind}" axis="1 0 0" '
-            f'{armature}{words} {STIFF}/>\n      {_TINY.format(mass=1e-9 if turns else inertia)}\n'
-            f'{inner}    </body>\n')
+            f'{words} {STIFF}/>\n      <inertial pos="0 0 0" mass="{inertia:.9g}" '
+            f'diaginertia="{inertia:.9g} {inertia:.9g} {inertia:.9g}"/>\n{inner}    </body>\n')
 
 
 def _hung(n: Numbers, kind: str, last: float) -> tuple[str, float]:
@@ -45,13 +39,8 @@ def _hung(n: Numbers, kind: str, last: float) -> tuple[str, float]:
     if not share:
         return '', 0.0
     turn = 2.0 * math.pi * n['hung_hz']
-    held = (f'stiffness="{share * turn ** 2:.9g}" '
-            f'damping="{2.0 * n["hung_damping"] * share * turn:.9g}"')
-    # a hinge swings an inertia, a slide carries a mass: both ride on the body that holds them
-    inertia = (f'<inertial pos="0 0 0" mass="1e-9" diaginertia="{share:.9g} {share:.9g} '
-               f'{share:.9g}"/>' if kind == 'hinge' else _TINY.format(mass=share))
-    return (f'      <body name="hung"><joint name="hung" type="{kind}" axis="1 0 0" {held}/>'
-            f'{inertia}</body>\n', share)
+    return _body('hung', kind, share, f'stiffness="{share * turn ** 2:.9g}" '
+                 f'damping="{2.0 * n["hung_damping"] * share * turn:.9g}"'), share
 
 
 def _own_motor(n: Numbers) -> str:
@@ -91,11 +80,9 @@ def _rubbing(n: Numbers) -> str:
 
 def _stop(n: Numbers) -> str:
     """Return a soft stop inside the way."""
-    if not n.get('stop_at'):
-        return ''
-    low, high = (-1e3, n['stop_at']) if n['stop_at'] > 0.0 else (n['stop_at'], 1e3)
-    return (f' limited="true" range="{low:.9g} {high:.9g}" solreflimit="0.03 1" '
-            'solimplimit="0.5 0.95 0.5"')
+    at = n.get('stop_at', 0.0)
+    return at and (f' limited="true" range="{min(at, -1e3 * at):.9g} {max(at, -1e3 * at):.9g}" '
+                   'solreflimit="0.03 1" solimplimit="0.5 0.95 0.5"') or ''
 
 
 def _joint(n: Numbers) -> tuple[str, str]:
@@ -112,7 +99,7 @@ def _joint(n: Numbers) -> tuple[str, str]:
                    f'<inertial pos="0 {-arm * math.sin(phase):.9g} {arm * math.cos(phase):.9g}" '
                    f'mass="{LINK_MASS}" diaginertia="1e-12 1e-12 1e-12"/></body>\n')
         rest += (f'  <equality><joint joint1="link" joint2="load" polycoef="0 {1.0 / gear:.9g} '
-                 f'0 0 0" {HARD}/></equality>\n')
+                 '0 0 0" solref="0.001 1" solimp="0.999 0.999 1"/></equality>\n')
     return bodies, rest + _ends(n)
 
 

@@ -17,7 +17,6 @@ import numpy as np
 
 # Where a motor's LuGre keeps its levels: Coulomb, and at rest.
 _LUGRE = slice(3, 5)
-# The law of the controller, as Python: compiled it is a part of another simulation.
 _DEMANDED: Any = getattr(demanded, 'py_func', demanded)
 
 
@@ -42,6 +41,7 @@ def simulate(name: str, n: Numbers, asked: FloatArray, start: float, begin: int,
     parts, digit = round(TICK_S / STEP_S), n['digit']
     history, clips = np.zeros((2, asked.size)), n.get('clips', math.inf)
     sheet = SimpleNamespace(**{'dead_zone': 0.0, **n})
+    # the controller of the data sheet is compiled into another simulation; here it is Python
     before, integral = digit * math.floor(_encoder(n, -1.0, start) / digit + 0.5), 0.0
     for k in range(asked.size):
         t = (k - begin) * TICK_S
@@ -61,13 +61,9 @@ def simulate(name: str, n: Numbers, asked: FloatArray, start: float, begin: int,
 
 def _encoder(n: Numbers, t: float, position: float) -> float:
     """Return what the encoder reads before its digit [rad or m]."""
-    read = position
-    if n.get('encoder_error'):
-        read += n['encoder_error'] * math.sin(
-            n.get('encoder_cycles', 1.0) * position + n['encoder_phase'])
-    if n.get('slip') and t >= n['slip_at']:
-        read += n['slip']
-    return read
+    wave = n.get('encoder_error', 0.0) * math.sin(
+        n.get('encoder_cycles', 1.0) * position + n.get('encoder_phase', 0.0))
+    return position + wave + n.get('slip', 0.0) * (t >= n.get('slip_at', 0.0))
 
 
 def _follow(model: Any, n: Numbers, t: float, data: Any) -> None:

@@ -43,11 +43,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     what.add_argument('--entry', metavar='CMD', help='run a command on each case')
     what.add_argument('--score', type=Path, metavar='DIR',
                       help='print the table of all results on these cases, and compare them')
-    parser.add_argument('results', type=Path, nargs='*', metavar='FILE',
-                        help='with --score: results of methods (.jsonl)')
+    parser.add_argument('results', type=Path, nargs='*', metavar='FILE', help='for --score')
     parser.add_argument('--seed', type=int, metavar='S', help='with --make: seed of the cases')
-    parser.add_argument('--out', type=Path, metavar='PATH',
-                        help='folder of the cases, or file of the results')
+    parser.add_argument('--out', type=Path, metavar='PATH', help='the cases, or the results')
     parser.add_argument('--practice', action='store_true',
                         help='with --make: cases to practise on, with their truths')
     parser.add_argument('--machine', action='append', choices=sorted(BENCHMARK.values()),
@@ -55,21 +53,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--cases', type=Path, metavar='DIR', help='with --entry: the cases')
     parser.add_argument('--time-limit', type=float, default=1800.0, metavar='S',
                         help='with --entry: for one case [s] (default %(default)g)')
-    parser.add_argument('--jobs', type=int, default=1, metavar='N',
-                        help='cases at a time (default: %(default)s)')
+    parser.add_argument('--jobs', type=int, default=1, metavar='N', help='cases at a time')
     parser.add_argument('--quiet', action='store_true', help='show no progress')
     add_json_option(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Make cases, enter a method or score several; 1 if a case has no verdict."""
-    check_options(arguments, seed=Entry('', 0, PRACTICE - 1, whole=True),
-                  make=Entry('', 1, whole=True), jobs=Entry('', 1, whole=True),
+    some = Entry('', 1, whole=True)
+    check_options(arguments, seed=Entry('', 0, PRACTICE - 1, whole=True), make=some, jobs=some,
                   time_limit=Entry('s', 1e-3))
-    if arguments.make is not None:
-        return _make(arguments)
-    if arguments.entry is not None:
-        return _enter(arguments)
+    if arguments.score is None:
+        return _make(arguments) if arguments.entry is None else _enter(arguments)
     if not arguments.results:
         raise UserError('--score: no results; name the files that --entry CMD --out wrote')
     methods = {path.stem: entries.answered(arguments.score, path) for path in arguments.results}
@@ -91,19 +86,16 @@ def _make(arguments: argparse.Namespace) -> int:
     machines = [name for name, short in BENCHMARK.items()
                 if short in (arguments.machine or ['joint'])]
     with Progress('recordings', arguments.make, quiet=arguments.quiet) as progress:
-        manifest = entries.make(
+        seal = sealing.manifest_seal(entries.make(
             arguments.out, arguments.make, arguments.seed, machines, arguments.practice,
-            arguments.jobs, lambda done, total: progress.update(done))
-    print(f'{arguments.out}: {arguments.make} truths sealed, manifest '
-          f'{sealing.manifest_seal(manifest)}')
+            arguments.jobs, lambda done, total: progress.update(done)))
+    print(f'{arguments.out}: {arguments.make} truths sealed, manifest {seal}')
     return 0
 
 
 def _enter(arguments: argparse.Namespace) -> int:
     _needed(arguments, 'cases', 'out')
-    command = shlex.split(arguments.entry)
-    if not command:
-        raise UserError('--entry: is empty; give a command that takes the folder of a case')
+    command = shlex.split(arguments.entry) or ['']
     count = len(sealing.read_manifest(arguments.cases)['seals'])
     with Progress('cases', count, quiet=arguments.quiet) as progress:
         failures = entries.enter(arguments.cases, command, arguments.out, arguments.time_limit,
@@ -121,9 +113,7 @@ def _lines(found: Mapping[str, Any]) -> list[str]:
         bounds = {**figures['ci95'], 'auroc_unknown': figures['auroc_ci95']}
         cells = ''.join(f'{_cell(figures[key], bounds.get(key)):>20}' for key in COLUMNS.values())
         lines.append(f'{name:<{width}}{figures["cases"]:>5} {cells}')
-    if found['pairs']:
-        lines += ['', 'right on the same cases']
-    return lines + [
+    return lines + ['', 'right on the same cases'] * bool(found['pairs']) + [
         f'{pair["names"][0]} and {pair["names"][1]}: both {pair["both"]} of {pair["cases"]}, '
         f'only the first {pair["first"]}, only the second {pair["second"]}, p = {pair["p"]:.2g}'
         for pair in found['pairs']]

@@ -107,11 +107,7 @@ def moved(truth: Truth, recording: int, start: float) -> Moved:
 def make_recording(truth: Truth, recording: int,
                    simulated: Callable[[Truth, int, float], Moved] = moved,
                    ) -> dict[str, FloatArray]:
-    """
-    Return the columns of one recording of a case (from 0) by name, each of shape (n,).
-
-    `simulated` gives what `moved` gives.
-    """
+    """Return the columns of a recording (from 0) of a case, shape (n,); `simulated` as `moved`."""
     random = np.random.default_rng([*truth['seed'], 2 + recording])
     kind, flaws, rate = kind_of(truth['machine']), truth['imperfections'], truth['sample_rate_hz']
     size = kind.table['start']

@@ -26,8 +26,7 @@ def draw_tests(table: Mapping[str, Any], random: np.random.Generator) -> list[Te
     """
     Draw the three tests of a case: shape, duration [s] and the numbers of the shape.
 
-    The machine's table has reach, step, rate, greatest_rate and greatest_acceleration; it may have
-    how long a test `lasts` [s].
+    The table has reach, step, rate, greatest_rate, greatest_acceleration and may have lasts [s].
     """
     shapes = ('steps', str(random.choice(['triangle', 'sine'])),
               str(random.choice(['chirp', 'multisine'])))

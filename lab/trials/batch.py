@@ -130,12 +130,10 @@ def _write_other(folder: Path, truth: Truth, number: int, name: str) -> None:
     kind = kind_of(truth['machine'])
     room = benchmark if kind.name in BENCHMARK else others
     write_csv(folder / f'{name}.csv', room.make_recording(truth, number), kind.formats)
-    if room is not benchmark:
-        return
-    if name == KEPT_BACK:
+    if room is benchmark and name == KEPT_BACK:
         write_csv(folder / PREDICTIONS['before'], benchmark.base_prediction(truth, number),
                   kind.formats)
-    else:
+    elif room is benchmark:
         benchmark.write_task(folder, truth)
 
 

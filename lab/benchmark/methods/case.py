@@ -2,9 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """The folder of a case as our entries read it, and the two files that they write into it."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 import json
 from pathlib import Path
+import sys
 from typing import Any
 
 from lab.benchmark.cases import COMMAND, SHEET
@@ -32,8 +33,8 @@ class CaseFolder:
 
     def write(self, which: Sequence[Mapping[str, Any]], **more: Any) -> None:
         """Write the verdict: entries of effects and probability."""
-        said = which[0]['effects'] if which else ['unknown']
-        word = {'none': 'no_gap', 'unknown': 'unknown_effect'}.get(said[0], 'explained')
+        word = {'none': 'no_gap', 'unknown': 'unknown_effect'}.get(
+            which[0]['effects'][0], 'explained')
         (self.folder / VERDICT).write_text(json.dumps(
             {'verdict': word, 'which': list(which), **more}, indent=1) + '\n', encoding='utf-8')
 
@@ -49,3 +50,11 @@ class CaseFolder:
         table = np.column_stack([whole.time, *(found[name] for name in places)])
         np.savetxt(self.folder / PREDICTED, table, '%.9g', ',', comments='', header=','.join(
             ['time_s', *(reading.column for reading in places.values())]))
+
+
+def enter(method: Callable[[CaseFolder], None]) -> None:
+    """Let a method answer the case that the command line names; end with a line on a mistake."""
+    try:
+        method(CaseFolder(Path(*sys.argv[1:2])))
+    except UserError as error:
+        sys.exit(str(error))

@@ -3,25 +3,20 @@
 """
 Enter what an engineer would write: `python -m lab.benchmark.methods.least_squares CASE`.
 
-The base model, and the base model with one effect or two, are each fitted by SciPy's robust least
-squares within the data sheet's tolerances; BIC (G. Schwarz, Annals of Statistics 6, 1978) weighs
-them, with a sample worth SHARE of one, because noise and model errors are coloured. If the best
-leaves more than noise would, the answer is 'unknown'. SHARE and LEVEL were chosen on practice
-cases.
+The base model with no effect, one or two is fitted by SciPy's robust least squares within the
+tolerances; BIC (G. Schwarz, Annals of Statistics 6, 1978) weighs them, a sample being worth SHARE
+of one, as noise is coloured. If the best leaves more than noise would, the answer is 'unknown'.
+SHARE and LEVEL were chosen on ten practice cases.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 import math
-from pathlib import Path
-import sys
-from typing import Any
 
-from lab.benchmark.methods.case import CaseFolder
+from lab.benchmark.methods.case import CaseFolder, enter
 from lab.joints.mechanism import FloatArray
 import numpy as np
 from scipy.optimize import least_squares
-from simgap.errors import UserError
 from simgap.machine.contract import Form, Parameter
 from simgap.model import OwnMachine
 
@@ -33,7 +28,7 @@ CLIP = 3.0                  # residuals beyond it count by their size, not its s
 
 
 @dataclass(frozen=True)
-class Fit:
+class Hypothesis:
     """A hypothesis as fitted."""
 
     forms: Mapping[str, Form]       # by effect
@@ -42,32 +37,29 @@ class Fit:
     size: int                       # parameters that are fitted
 
 
-class Problem:
+class AllTests:
     """All tests of a case, as one problem of least squares."""
 
     def __init__(self, case: CaseFolder) -> None:
-        """Take the tests; what is missing has no weight."""
-        self.machine = OwnMachine(case.model, case.logs)
-        self.tests = range(len(case.logs))
+        """Take the tests."""
+        self.machine, self.tests = OwnMachine(case.model, case.logs), range(len(case.logs))
         self.count = sum(int(np.isfinite(item.measured).sum())
                          for item in self.machine.experiments)
 
     def left(self, values: Mapping[str, float], test: int) -> FloatArray:
-        """Return what the simulation leaves of a test, over the noise of the data sheet."""
+        """Return what is left of a test, over noise and model error; 0 where a row is missing."""
         item = self.machine.experiments[test]
+        left = self.machine.predict(values, test) - item.measured
         assert item.model_error is not None
-        scale = np.hypot(item.noise, item.model_error)
-        return np.asarray(np.nan_to_num((self.machine.predict(values, test) - item.measured)
-                                        / scale).ravel())
+        return np.asarray(np.nan_to_num(left / np.hypot(item.noise, item.model_error)).ravel())
 
-    def fit(self, forms: Mapping[str, Form], start: Mapping[str, float], steps: int) -> Fit:
-        """Fit the base model's numbers and those of some effects, from a start."""
+    def fit(self, forms: Mapping[str, Form], start: Mapping[str, float], steps: int) -> Hypothesis:
+        """Hypothesis the base model's numbers and those of some effects, from a start."""
         numbers: list[Parameter] = [*self.machine.nuisances,
                                     *(p for form in forms.values() for p in form.parameters)]
         low, high = (np.array([getattr(p, end) for p in numbers]) for end in ('low', 'high'))
-        known = [(j, p.prior_sigma) for j, p in enumerate(numbers) if p.prior_sigma]
-        place, sigma = (np.array(part) for part in zip(*known, strict=True))
-        names = [p.name for p in numbers]
+        sigma, names = np.array([p.prior_sigma or np.inf for p in numbers]), [
+            p.name for p in numbers]
         inside = 1e-6 * (high - low)
         first = np.clip([start.get(p.name, p.start) for p in numbers], low + inside,
                         high - inside)
@@ -75,10 +67,7 @@ class Problem:
         def parts(x: FloatArray, test: int | None) -> list[FloatArray]:
             values = dict(zip(names, map(float, x), strict=True))
             return [self.left(values, k) if test in (None, k) else np.zeros(0)
-                    for k in self.tests] + [x[place] / sigma]
-
-        def residuals(x: FloatArray) -> FloatArray:
-            return np.concatenate(parts(x, None))
+                    for k in self.tests] + [x / sigma]
 
         def slopes(x: FloatArray) -> FloatArray:
             here, columns = parts(x, None), []
@@ -90,12 +79,13 @@ class Problem:
                     for there, now in zip(parts(moved, p.experiment), here, strict=True)]))
             return np.array(columns).T
 
-        found = least_squares(residuals, first, slopes, bounds=(low, high), x_scale=high - low,
-                              loss='soft_l1', f_scale=CLIP, max_nfev=steps, ftol=1e-4)
-        return Fit(forms, dict(zip(names, map(float, found.x), strict=True)), float(found.cost),
+        found = least_squares(
+            lambda x: np.concatenate(parts(x, None)), first, slopes, bounds=(low, high),
+            x_scale=high - low, loss='soft_l1', f_scale=CLIP, max_nfev=steps, ftol=1e-4)
+        return Hypothesis(forms, dict(zip(names, map(float, found.x), strict=True)), float(found.cost),
                    len(numbers))
 
-    def widened(self, base: Fit, effect: str) -> Fit:
+    def widened(self, base: Hypothesis, effect: str) -> Hypothesis:
         """Return a fit with one effect more, from the form and the size that promise most."""
         machine = self.machine
         left = [item.measured - machine.predict(base.values, k)
@@ -113,17 +103,15 @@ class Problem:
         _, _, best, start = min(starts)
         return self.fit({**base.forms, effect: best}, start, FIRST)
 
-    def bic(self, fit: Fit) -> float:
+    def bic(self, fit: Hypothesis) -> float:
         """Return BIC over two, negative: the logarithm of the evidence."""
-        worth = SHARE * self.count
-        return -0.5 * (worth * math.log(2.0 * fit.cost / self.count)
-                       + fit.size * math.log(worth))
+        worth, left = SHARE * self.count, math.log(2.0 * fit.cost / self.count)
+        return -0.5 * (worth * left + fit.size * math.log(worth))
 
 
-def main(folder: str) -> None:
-    """Fit all hypotheses, weigh them, and predict the kept test with the best."""
-    case = CaseFolder(Path(folder))
-    problem = Problem(case)
+def main(case: CaseFolder) -> None:
+    """Hypothesis all hypotheses, weigh them, and predict the kept test with the best."""
+    problem = AllTests(case)
     none = problem.fit({}, {}, LAST)
     singles = sorted((problem.widened(none, effect) for effect in problem.machine.catalogue),
                      key=problem.bic, reverse=True)
@@ -136,19 +124,12 @@ def main(folder: str) -> None:
     weights = np.exp([problem.bic(fit) - problem.bic(best) for fit in fits])
     level = math.sqrt(2.0 * best.cost / problem.count)
     unknown = 1.0 / (1.0 + math.exp(-(level - LEVEL) / WIDTH))
-    which: list[dict[str, Any]] = [
-        {'effects': sorted(fit.forms) or ['none'],
-         'probability': float((1.0 - unknown) * weight / weights.sum())}
-        for fit, weight in zip(fits, weights, strict=True)]
-    which.append({'effects': ['unknown'], 'probability': unknown})
-    which.sort(key=lambda entry: -entry['probability'])
-    case.write(which, level=level, scores={
-        '+'.join(sorted(fit.forms)): [problem.bic(fit), fit.cost, fit.size] for fit in fits})
+    shares = [*((1.0 - unknown) * weights / weights.sum()), unknown]
+    names = [*(sorted(fit.forms) or ['none'] for fit in fits), ['unknown']]
+    case.write([{'effects': effects, 'probability': float(share)} for share, effects in sorted(
+        zip(shares, names, strict=True), reverse=True)])
     case.predict(problem.machine.numbers(best.values, 0))
 
 
 if __name__ == '__main__':
-    try:
-        main(*sys.argv[1:])
-    except UserError as error:
-        sys.exit(str(error))
+    enter(main)

@@ -2,17 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Enter simgap: `python -m lab.benchmark.methods.ours CASE`."""
 
-from pathlib import Path
-import sys
-
-from lab.benchmark.methods.case import CaseFolder
-from simgap.errors import UserError
+from lab.benchmark.methods.case import CaseFolder, enter
 from simgap.model import diagnose_logs, OwnMachine
 
 
-def main(folder: str) -> None:
+def main(case: CaseFolder) -> None:
     """Diagnose a case with a user's model, and predict its kept test."""
-    case = CaseFolder(Path(folder))
     verdict = diagnose_logs(case.model, case.logs, threads=1)
     data = verdict.as_data()
     case.write(data['which'], **{key: data[key] for key in ('verdict', 'confusable', 'how_far')})
@@ -22,7 +17,4 @@ def main(folder: str) -> None:
 
 
 if __name__ == '__main__':
-    try:
-        main(*sys.argv[1:])
-    except UserError as error:
-        sys.exit(str(error))
+    enter(main)

@@ -9,10 +9,7 @@ predicts of the rest, in samples that it did not see, is 'unknown'. Nothing is s
 fourth test is not predicted. The constants were chosen on eight practice cases.
 """
 
-from pathlib import Path
-import sys
-
-from lab.benchmark.methods.case import CaseFolder
+from lab.benchmark.methods.case import CaseFolder, enter
 from lab.joints.mechanism import FloatArray
 import numpy as np
 from scipy.signal import savgol_filter
@@ -21,11 +18,9 @@ from simgap.model import Log
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, WhiteKernel
 
-KNOWN = 0.15            # share by which inertia over constant may be off
-SOFT = 6.0              # times the nominal compliance
-UNEXPLAINED = 0.5      # of the variance, which the process predicts where 'unknown' is even
-SAMPLES = 400           # that the process learns from, and as many to test it
-WINDOW_S = 0.04         # of the smoothing polynomial
+KNOWN, SOFT = 1.15, 6.0     # times the nominal inertia over constant, and compliance
+UNEXPLAINED = 0.5       # of the variance, which the process predicts where 'unknown' is even
+SAMPLES, WINDOW_S = 400, 0.04   # that the process learns from; of the smoothing polynomial
 WORTH, GAIN = 0.1, 5.0  # of a sample in BIC, and of BIC for one term more
 
 
@@ -47,10 +42,9 @@ def terms(log: Log) -> tuple[FloatArray, FloatArray, dict[str, FloatArray]]:
         'encoder.cyclic_error': [w * np.sin(q), w * np.cos(q)],
         **{f'motor.torque_ripple {k}': [np.sin(k * q), np.cos(k * q)] for k in range(2, 15)}}
     # what a derivative is wrong by grows with the current
-    weight = (1.0 / (1.0 + 3.0 * np.abs(i)))[moving]
-    return i[moving] * weight, base[moving] * weight[:, None], {
-        name: np.column_stack(columns)[moving] * weight[:, None]
-        for name, columns in candidates.items()}
+    weight = (1.0 / (1.0 + 3.0 * np.abs(i)))[moving, None]
+    return i[moving] * weight[:, 0], base[moving] * weight, {
+        name: np.column_stack(columns)[moving] * weight for name, columns in candidates.items()}
 
 
 def left(current: FloatArray, columns: FloatArray) -> tuple[FloatArray, float]:
@@ -60,17 +54,15 @@ def left(current: FloatArray, columns: FloatArray) -> tuple[FloatArray, float]:
     return rest, -0.5 * (worth * np.log(np.mean(rest ** 2)) + columns.shape[1] * np.log(worth))
 
 
-def main(folder: str) -> None:
+def main(case: CaseFolder) -> None:
     """Choose terms, and let a process tell what they leave."""
-    case = CaseFolder(Path(folder))
     if case.sheet['machine'] != 'joint':
-        raise UserError(f'{folder}: its terms are those of a joint; leave the axis out')
+        raise UserError(f'{case.folder}: its terms are those of a joint; leave the axis out')
     parts = [terms(log) for log in case.logs]
-    current = np.concatenate([part[0] for part in parts])
-    columns = base = np.concatenate([part[1] for part in parts])
+    current, base = (np.concatenate([part[k] for part in parts]) for k in (0, 1))
     library = {name: np.concatenate([part[2][name] for part in parts]) for name in parts[0][2]}
     n, named = case.sheet['nominal'], set[str]()
-    rest, before = left(current, columns)
+    columns, (rest, before) = base, left(current, base)
     for _ in range(2):
         (now, name), *_ = sorted(((left(current, np.column_stack([columns, more]))[1], name)
                                   for name, more in library.items()), reverse=True)
@@ -80,7 +72,7 @@ def main(folder: str) -> None:
         rest, before = left(current, columns)
         named.add(name.partition(' ')[0])
     found = n['constant'] * np.linalg.lstsq(columns, current, rcond=None)[0]
-    if found[0] > (1.0 + KNOWN) * (n['motor'] + n['load']):
+    if found[0] > KNOWN * (n['motor'] + n['load']):
         named.add('load.inertia')
     elif found[5] > SOFT * n['load'] ** 2 / n['stiffness']:
         named.add('gearbox.compliance')
@@ -95,13 +87,9 @@ def main(folder: str) -> None:
     wrong = target[SAMPLES:] - process.predict(state[SAMPLES:])
     explained = 1.0 - float(np.var(wrong) / np.var(target[SAMPLES:]))
     unknown = 1.0 / (1.0 + np.exp(-(explained - UNEXPLAINED) / 0.07))
-    which = [{'effects': sorted(named) or ['none'], 'probability': float(1.0 - unknown)},
-             {'effects': ['unknown'], 'probability': float(unknown)}]
-    case.write(sorted(which, key=lambda entry: -float(str(entry['probability']))))
+    case.write([{'effects': effects, 'probability': float(share)} for share, effects in sorted(
+        [(1.0 - unknown, sorted(named) or ['none']), (unknown, ['unknown'])], reverse=True)])
 
 
 if __name__ == '__main__':
-    try:
-        main(*sys.argv[1:])
-    except UserError as error:
-        sys.exit(str(error))
+    enter(main)
