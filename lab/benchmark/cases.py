@@ -107,9 +107,9 @@ def make_recording(truth: Truth, recording: int) -> dict[str, FloatArray]:
 def write_task(folder: Path, truth: Truth) -> None:
     """Write what a case has beside its recordings: data sheet, base model, command kept back."""
     kind, rate = kind_of(truth['machine']), truth['sample_rate_hz']
-    sheet = {'machine': (name := BENCHMARK[kind.name]), 'sample_rate_hz': rate, 'effects': sorted(kind.catalogue), **{
-        key: kind.table[key] for key in (
-            'columns', 'nominal', 'tolerances', 'noise', 'digits', 'zero', 'gain')}}
+    sheet = {'machine': (name := BENCHMARK[kind.name]), 'sample_rate_hz': rate,
+             'effects': sorted(kind.catalogue), **{key: kind.table[key] for key in (
+                 'columns', 'nominal', 'tolerances', 'noise', 'digits', 'zero', 'gain')}}
     (folder / SHEET).write_text(json.dumps(sheet, indent=1) + '\n', encoding='utf-8')
     (folder / f'{name}.xml').write_text(mjcf(name, kind.table['nominal']), encoding='utf-8')
     test = truth['tests'][-1]

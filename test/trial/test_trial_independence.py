@@ -24,7 +24,8 @@ ALLOWED = (*ANTENNA, 'lab.benchmark', 'lab.joints', 'lab.trials', 'antenna_drive
 MODELS = [LAB / 'joints' / 'models', LAB / 'benchmark' / 'methods']
 SOURCES = [(source, ANTENNA if room == 'antenna' else ALLOWED)
            for room in ('antenna', 'benchmark', 'joints', 'trials')
-           for source in sorted((LAB / room).rglob('*.py')) if source.parent not in MODELS and source.stem != 'models']
+           for source in sorted((LAB / room).rglob('*.py'))
+           if source.parent not in MODELS and source.stem != 'models']
 
 
 @pytest.mark.parametrize('source, allowed', SOURCES,

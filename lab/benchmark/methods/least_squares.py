@@ -82,8 +82,8 @@ class AllTests:
         found = least_squares(
             lambda x: np.concatenate(parts(x, None)), first, slopes, bounds=(low, high),
             x_scale=high - low, loss='soft_l1', f_scale=CLIP, max_nfev=steps, ftol=1e-4)
-        return Hypothesis(forms, dict(zip(names, map(float, found.x), strict=True)), float(found.cost),
-                   len(numbers))
+        return Hypothesis(forms, dict(zip(names, map(float, found.x), strict=True)),
+                          float(found.cost), len(numbers))
 
     def widened(self, base: Hypothesis, effect: str) -> Hypothesis:
         """Return a fit with one effect more, from the form and the size that promise most."""
