@@ -17,7 +17,8 @@ from lab.cli import main
 from lab.joints.machines import kind_of
 from lab.trials import batch, sealing
 from lab.trials.held_back import closed_fraction, noise_power
-from lab.trials.scorecard import Case
+from lab.trials.scorecard import Case, score
+from lab.trials.scored_cases import read_scored
 import numpy as np
 import pytest
 from simgap.errors import UserError
@@ -209,3 +210,17 @@ def test_the_table_is_printed_and_a_changed_truth_is_refused(
     truth.write_text(truth.read_text().replace('"salt": "', '"salt": "0'))
     assert main(['benchmark', '--score', str(cases), out]) == 2
     assert Case(truth_of(cases, 'case_0002'), None).machine == 'mujoco_joint'
+
+
+@pytest.mark.parametrize(('method', 'singles', 'pairs'), [
+    ('ours', 11, 1), ('least_squares', 11, 3), ('residuals', 3, 0)])
+def test_the_notebook_quotes_its_published_cases(method: str, singles: int, pairs: int) -> None:
+    notebook = Path(batch.__file__).parents[1] / 'notebook'
+    figures = score(read_scored(notebook / f'benchmark_joint_1_{method}.jsonl'))
+    text = (notebook / 'benchmark.md').read_text()
+    assert figures['top1'] == pytest.approx(singles / 13)
+    assert figures['pairs_both'] == pytest.approx(pairs / 4)
+    for name in ('top1', 'pairs_both', 'no_gap_on_none', 'overconfident_outside'):
+        low, high = figures['ci95'][name]
+        assert f'{figures[name]:.2f} ({low:.2f} to {high:.2f})' in text
+    assert f'{figures["auroc_unknown"]:.2f} (' in text
