@@ -212,15 +212,17 @@ def test_the_table_is_printed_and_a_changed_truth_is_refused(
     assert Case(truth_of(cases, 'case_0002'), None).machine == 'mujoco_joint'
 
 
-@pytest.mark.parametrize(('method', 'singles', 'pairs'), [
-    ('ours', 11, 1), ('least_squares', 11, 3), ('residuals', 3, 0)])
-def test_the_notebook_quotes_its_published_cases(method: str, singles: int, pairs: int) -> None:
+@pytest.mark.parametrize(('name', 'singles', 'pairs'), [
+    ('joint_1_ours', 11, 1), ('joint_1_least_squares', 11, 3), ('joint_1_residuals', 3, 0),
+    ('axis_1_ours', 6, 2), ('axis_1_least_squares', 4, 2)])
+def test_the_notebook_quotes_its_published_cases(name: str, singles: int, pairs: int) -> None:
     notebook = Path(batch.__file__).parents[1] / 'notebook'
-    figures = score(read_scored(notebook / f'benchmark_joint_1_{method}.jsonl'))
+    figures = score(read_scored(notebook / f'benchmark_{name}.jsonl'))
     text = (notebook / 'benchmark.md').read_text()
-    assert figures['top1'] == pytest.approx(singles / 13)
-    assert figures['pairs_both'] == pytest.approx(pairs / 4)
-    for name in ('top1', 'pairs_both', 'no_gap_on_none', 'overconfident_outside'):
-        low, high = figures['ci95'][name]
-        assert f'{figures[name]:.2f} ({low:.2f} to {high:.2f})' in text
+    of_singles, of_pairs = (figures['by_kind'][kind]['cases'] for kind in ('single', 'pair'))
+    assert figures['top1'] * of_singles == pytest.approx(singles)
+    assert figures['pairs_both'] * of_pairs == pytest.approx(pairs)
+    for figure in ('top1', 'pairs_both', 'no_gap_on_none', 'overconfident_outside'):
+        low, high = figures['ci95'][figure]
+        assert f'{figures[figure]:.2f} ({low:.2f} to {high:.2f})' in text
     assert f'{figures["auroc_unknown"]:.2f} (' in text
