@@ -17,6 +17,7 @@ COMMANDS = {
     'trial-test': Command('trial_test', 'make one test more on a sealed antenna'),
     'twin-trial': Command('twin_trial', 'test the twin on sealed antennas that change'),
     'score': Command('score', 'score the verdicts of a trial against its truths'),
+    'benchmark': Command('benchmark', 'put any method beside others on cases by MuJoCo'),
     'servo': Command('servo', 'say what the model of an ordinary servo lacks'),
     'calibrate': Command('calibrate', 'fit parameters to the published figures'),
     'bench': Command('bench', 'measure speed'),

@@ -7,7 +7,7 @@ A case follows entirely from its truth, including the noise. Each is drawn as a 
 antenna: an effect, two, none, or one that the model lacks, with imperfections that no sheet lists.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 from lab.antenna.cases import (
@@ -16,13 +16,13 @@ from lab.antenna.cases import (
 from lab.antenna.imperfections import draw_recorder, kept_rows, recorder_noise
 from lab.antenna.sensors import STAMP_DIGIT_S, STAMP_ERROR_S
 from lab.joints.machines import Cause, Kind, kind_of
-from lab.joints.mechanism import FloatArray, simulate, TICK_S
+from lab.joints.mechanism import FloatArray, Mechanism, simulate, TICK_S
 from lab.joints.programme import draw_tests, RATES_HZ, reference, ticks_of
 import numpy as np
 
 # The drive holds the first position for so long before the recording begins.
 BEFORE_S = 0.5
-READINGS = ('position', 'current')
+Moved = tuple[FloatArray, FloatArray, dict[str, FloatArray]]
 
 
 def draw_truths(count: int, seed: int, machines: Sequence[str]) -> list[Truth]:
@@ -43,7 +43,7 @@ def draw_truths(count: int, seed: int, machines: Sequence[str]) -> list[Truth]:
             'effects': [{'id': cause.key, 'size': size, 'parameters': cause.draw(size, own)}
                         for cause, size in effects],
             'deviations': kind_of(name).deviations(own), 'seed': [seed, number],
-            'sample_rate_hz': int(own.choice(RATES_HZ)),
+            'sample_rate_hz': int(own.choice(kind_of(name).table.get('rates', RATES_HZ))),
             'tests': draw_tests(kind_of(name).table, own),
             'imperfections': draw_imperfections(kind_of(name), own)})
     return truths
@@ -81,11 +81,10 @@ def draw_imperfections(kind: Kind, random: np.random.Generator) -> dict[str, Any
     return {
         'gain': {name: within(share) for name, share in table['gain'].items()},
         'zero': {name: within(size) for name, size in table['zero'].items()},
-        **draw_recorder(READINGS, READINGS, random)}
+        **draw_recorder(kind.readings, kind.readings, random)}
 
 
-def moved(truth: Truth, recording: int, start: float,
-          ) -> tuple[FloatArray, FloatArray, dict[str, FloatArray]]:
+def moved(truth: Truth, recording: int, start: float) -> Moved:
     """
     Simulate one test (from 0) of a case, from `start` off the first reference.
 
@@ -99,22 +98,24 @@ def moved(truth: Truth, recording: int, start: float,
     ticks = ticks_of(rate)
     count = (times.size - 1) * ticks + 1
     position, current = np.zeros(count), np.zeros(count)
-    machine = kind.mechanism(truth['deviations'], truth['effects'], test['duration_s'])
+    machine = Mechanism(**kind.numbers(truth['deviations'], truth['effects'], test['duration_s']))
     simulate(machine, asked, ticks, round(BEFORE_S / TICK_S), float(asked[0] + start), position,
              current)
     return times, asked, {'position': position, 'current': current}
 
 
-def make_recording(truth: Truth, recording: int) -> dict[str, FloatArray]:
-    """Return the columns of one recording of a case (from 0) by name, each of shape (n,)."""
+def make_recording(truth: Truth, recording: int,
+                   simulated: Callable[[Truth, int, float], Moved] = moved,
+                   ) -> dict[str, FloatArray]:
+    """Return the columns of a recording (from 0) of a case, shape (n,); `simulated` as `moved`."""
     random = np.random.default_rng([*truth['seed'], 2 + recording])
     kind, flaws, rate = kind_of(truth['machine']), truth['imperfections'], truth['sample_rate_hz']
     size = kind.table['start']
-    times, asked, history = moved(truth, recording, float(random.uniform(-size, size)))
+    times, asked, history = simulated(truth, recording, float(random.uniform(-size, size)))
     instants = TICK_S * np.arange(history['position'].size)
     columns = {'time_s': _stamps(times, flaws, random), kind.columns['reference']: asked}
     noise = recorder_noise(flaws, rate, random)
-    for name in READINGS:
+    for name in kind.readings:
         late = flaws['delay_samples'][name] / rate
         exact = np.interp(times - late, instants, history[name])
         columns[kind.columns[name]] = (

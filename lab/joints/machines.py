@@ -15,11 +15,13 @@ from typing import Any
 
 from lab.antenna.effect import drawn, Parameters, Quantity
 from lab.antenna.table import read_table
-from lab.joints.mechanism import Mechanism
 import numpy as np
 
 MACHINES = ('joint', 'axis')
+# The same in MuJoCo, by name the table in the room of the benchmark.
+BENCHMARK = {'mujoco_joint': 'joint', 'mujoco_axis': 'axis'}
 MODELS = Path(__file__).with_name('models')
+ROOM = Path(__file__).parents[1] / 'benchmark'
 # Numbers that are a part of the test, and become a time.
 _SHARES_OF_A_TEST = ('brake_from', 'brake_until', 'slip_at')
 
@@ -53,7 +55,7 @@ class Cause:
 class Kind:
     """A kind of machine."""
 
-    name: str                       # one of MACHINES
+    name: str                       # one of MACHINES or BENCHMARK
     table: Mapping[str, Any]        # its YAML file
     catalogue: Mapping[str, Cause]  # its effects by key
     outside: Mapping[str, Cause]    # what its model lacks by key
@@ -65,6 +67,11 @@ class Kind:
         return found
 
     @property
+    def readings(self) -> tuple[str, ...]:
+        """Return the names of what is read, such as 'position'."""
+        return tuple(name for name in self.columns if name != 'reference')
+
+    @property
     def formats(self) -> dict[str, str]:
         """Return how the columns of a recording are written."""
         return {'time_s': '%.6f', **{
@@ -73,6 +80,8 @@ class Kind:
     @property
     def model(self) -> str:
         """Return the model that diagnoses it, as `antenna-drive diagnose --model` takes it."""
+        if self.name in BENCHMARK:
+            return f'{ROOM / "models.py"}:{BENCHMARK[self.name]}'
         return f'{MODELS / self.name}.py:machine'
 
     def cause(self, key: str) -> Cause:
@@ -84,10 +93,10 @@ class Kind:
         return {name: 1.0 + float(random.uniform(-share, share))
                 for name, share in self.table['tolerances'].items()}
 
-    def mechanism(self, deviations: Mapping[str, float], effects: list[dict[str, Any]],
-                  duration: float) -> Mechanism:
+    def numbers(self, deviations: Mapping[str, float], effects: list[dict[str, Any]],
+                duration: float) -> dict[str, float]:
         """
-        Return one machine in one test of `duration` [s].
+        Return the numbers of one machine in one test of `duration` [s].
 
         Deviations are factors by the numbers that are off; `effects` are those of a truth.
         """
@@ -95,13 +104,15 @@ class Kind:
                    for name, value in self.table['nominal'].items()}
         for entry in effects:
             numbers = self.cause(entry['id']).changed(numbers, entry['parameters'], duration)
-        return Mechanism(**{name: float(value) for name, value in numbers.items()})
+        return {name: float(value) for name, value in numbers.items()}
 
 
 @cache
 def kind_of(name: str) -> Kind:
-    """Return a kind of machine by its name, one of MACHINES."""
-    table = read_table(f'{name}.yaml', Path(__file__).parent)
+    """Return a kind of machine by its name, one of MACHINES or BENCHMARK."""
+    place = BENCHMARK.get(name)
+    table = read_table(f'{place or name}.yaml',
+                       Path(__file__).parent if place is None else ROOM)
     return Kind(name, table, _causes(table['effects']), _causes(table['outside']))
 
 

@@ -26,12 +26,13 @@ def draw_tests(table: Mapping[str, Any], random: np.random.Generator) -> list[Te
     """
     Draw the three tests of a case: shape, duration [s] and the numbers of the shape.
 
-    The machine's table has reach, step, rate, greatest_rate and greatest_acceleration.
+    The table has reach, step, rate, greatest_rate, greatest_acceleration and may have lasts [s].
     """
     shapes = ('steps', str(random.choice(['triangle', 'sine'])),
               str(random.choice(['chirp', 'multisine'])))
     return [{'shape': shape, 'duration_s': duration, **_DRAW[shape](table, duration, random)}
-            for shape in shapes for duration in [round(_between(DURATION_S, random), 2)]]
+            for shape in shapes
+            for duration in [round(_between(table.get('lasts', DURATION_S), random), 2)]]
 
 
 def reference(test: Test, times: FloatArray) -> FloatArray:

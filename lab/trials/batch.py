@@ -25,8 +25,9 @@ from lab.antenna.programme import RECORDINGS
 from lab.antenna.real_antenna import FloatArray
 from lab.antenna.sensors import COLUMNS
 from lab.antenna.wild_programme import KEPT_BACK, LONGEST_S
+from lab.benchmark import cases as benchmark
 from lab.joints import cases as others
-from lab.joints.machines import kind_of
+from lab.joints.machines import BENCHMARK, kind_of
 from lab.trials import sealing
 from lab.trials.driver import Arm, complete, Done, Row
 from simgap.errors import UserError
@@ -77,7 +78,8 @@ def prepare(folder: Path, count: int, seed: int, tolerance: float, sample_rate: 
                             'give the same settings to resume it, or another --out')
         return manifest
     if machines:
-        truths = others.draw_truths(count, seed, machines)
+        room = benchmark if machines[0] in BENCHMARK else others
+        truths = room.draw_truths(count, seed, list(machines))
     else:
         truths = draw_truths(count, seed, tolerance, sample_rate=sample_rate, duration=duration,
                              wild=wild, family=family, largest=largest, longest=longest)
@@ -95,7 +97,7 @@ def write_csv(path: Path, columns: Mapping[str, FloatArray],
 
 def make_case(folder: Path, truth: Truth) -> None:
     """Write the recordings of one case and their test sheets; of a wild case, keep one back."""
-    if len(truth.get('sheets', ())) > len(RECORDINGS):
+    if len(truth.get('sheets') or truth.get('tests', ())) > len(RECORDINGS):
         (folder / KEPT).mkdir(exist_ok=True)
         _make_folder(folder / KEPT / truth['case'], truth, {len(RECORDINGS): KEPT_BACK})
     _make_folder(folder / truth['case'], truth, dict(enumerate(RECORDINGS)))
@@ -109,8 +111,7 @@ def _make_folder(final: Path, truth: Truth, names: Mapping[int, str]) -> None:
     try:
         for number, name in names.items():
             if 'machine' in truth:
-                write_csv(draft / f'{name}.csv', others.make_recording(truth, number),
-                          kind_of(truth['machine']).formats)
+                _write_other(draft, truth, number, name)
                 continue
             columns = make_recording(truth, number)
             write_csv(draft / f'{name}.csv', {key: columns[key] for key in COLUMNS})
@@ -122,6 +123,18 @@ def _make_folder(final: Path, truth: Truth, names: Mapping[int, str]) -> None:
         os.replace(draft, final)
     finally:
         shutil.rmtree(draft, ignore_errors=True)
+
+
+def _write_other(folder: Path, truth: Truth, number: int, name: str) -> None:
+    """Write one recording of a machine other than the antenna, and what else its case has."""
+    kind = kind_of(truth['machine'])
+    room = benchmark if kind.name in BENCHMARK else others
+    write_csv(folder / f'{name}.csv', room.make_recording(truth, number), kind.formats)
+    if room is benchmark and name == KEPT_BACK:
+        write_csv(folder / PREDICTIONS['before'], benchmark.base_prediction(truth, number),
+                  kind.formats)
+    elif room is benchmark:
+        benchmark.write_task(folder, truth)
 
 
 def make_cases(folder: Path, manifest: dict[str, Any], jobs: int,

@@ -16,6 +16,7 @@ from typing import Any
 from lab.antenna.imperfections import SPIKE_SIZE
 from lab.antenna.real_antenna import FloatArray
 from lab.antenna.sheet import SensorGrade
+from lab.joints.machines import kind_of
 import numpy as np
 
 # A signal has a gap to close if its mean square exceeds that of the noise by this factor.
@@ -41,6 +42,14 @@ def _columns(path: Path) -> dict[str, FloatArray]:
 
 def noise_power(column: str, truth: Mapping[str, Any], reading: FloatArray) -> float:
     """Return the mean square of what a recorder adds to a reading (n,), as the truth states."""
+    flaws = truth['imperfections']
+    low, high = SPIKE_SIZE
+    spike = flaws['spike_share'] * (high**3 - low**3) / (3.0 * (high - low))
+    if 'machine' in truth:
+        kind = kind_of(truth['machine'])
+        name = next(name for name in kind.readings if kind.columns[name] == column)
+        return (flaws['noise'][name]['level']**2 + spike) * kind.table['noise'][name]**2 + (
+            kind.table['digits'][name]**2 / 12.0)
     grade = SensorGrade(**truth['sheets'][-1]['sensors'])
     if column == 'encoder_rad':
         return (2.0 * math.pi / 2**grade.encoder_bits)**2 / 12.0
@@ -51,9 +60,7 @@ def noise_power(column: str, truth: Mapping[str, Any], reading: FloatArray) -> f
     power = noise**2
     if column.startswith('tach'):
         power += float(np.mean((grade.tach_noise_relative * reading)**2))
-    low, high = SPIKE_SIZE
-    spike = truth['imperfections']['spike_share'] * (high**3 - low**3) / (3.0 * (high - low))
-    return (truth['imperfections']['noise'][column]['level']**2 + spike) * power + digit**2 / 12.0
+    return (flaws['noise'][column]['level']**2 + spike) * power + digit**2 / 12.0
 
 
 def closed_fraction(recording: Path, before: Path, after: Path, truth: Mapping[str, Any]) -> float:
@@ -70,7 +77,9 @@ def closed_fraction(recording: Path, before: Path, after: Path, truth: Mapping[s
     for path, columns in zip((before, after), predicted):
         if columns['time_s'][0] > time[0] + slack or columns['time_s'][-1] < time[-1] - slack:
             raise PredictionError(f'{path}: does not cover the recording')
-    for name in sorted(recorded.keys() - {'time_s', 'rate_command_rad_s'}):
+    command = ('rate_command_rad_s' if 'machine' not in truth
+               else kind_of(truth['machine']).columns['reference'])
+    for name in sorted(recorded.keys() - {'time_s', command}):
         if any(name not in columns for columns in predicted):
             raise PredictionError(f'{name}: is not predicted')
         first, last = (

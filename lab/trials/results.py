@@ -21,14 +21,15 @@ FILE = 'results.jsonl'
 
 class TrialResults:
     """
-    The results of a trial, kept in its folder.
+    The results of a trial, kept in its folder unless `file` is given.
 
     Raise UserError, with file and line, where a line is not a result of this trial.
     """
 
-    def __init__(self, folder: Path, manifest: Mapping[str, Any]) -> None:
+    def __init__(self, folder: Path, manifest: Mapping[str, Any],
+                 file: Path | None = None) -> None:
         """Read what there is."""
-        self._path = folder / FILE
+        self._path = file or folder / FILE
         self._seed = manifest['settings']['seed']
         self._names = list(manifest['seals'])
         self._found: dict[str, dict[str, Any]] = {}

@@ -16,15 +16,16 @@ LAB = Path(lab.__file__).parent
 HOUSES = ('antenna_drive', 'lab', 'simgap')
 ANTENNA = ('lab.antenna', 'simgap.errors')
 # what starts processes and reports errors knows nothing of any drive
-ALLOWED = (*ANTENNA, 'lab.joints', 'lab.trials', 'antenna_drive.workers',
+ALLOWED = (*ANTENNA, 'lab.benchmark', 'lab.joints', 'lab.trials', 'antenna_drive.workers',
            'antenna_drive.programs', 'antenna_drive.remedies', 'antenna_drive.ros_releases',
            'antenna_drive.subcommand',
            'simgap.command.programs', 'simgap.command.remedies')
 # models that diagnose, which only a diagnosis loads
-MODELS = LAB / 'joints' / 'models'
+MODELS = [LAB / 'joints' / 'models', LAB / 'benchmark' / 'methods']
 SOURCES = [(source, ANTENNA if room == 'antenna' else ALLOWED)
-           for room in ('antenna', 'joints', 'trials')
-           for source in sorted((LAB / room).rglob('*.py')) if source.parent != MODELS]
+           for room in ('antenna', 'benchmark', 'joints', 'trials')
+           for source in sorted((LAB / room).rglob('*.py'))
+           if source.parent not in MODELS and source.stem != 'models']
 
 
 @pytest.mark.parametrize('source, allowed', SOURCES,

@@ -12,6 +12,7 @@ from typing import Any
 from lab.cli import main
 from lab.joints.cases import draw_truths, make_recording, moved
 from lab.joints.machines import kind_of, MACHINES
+from lab.joints.mechanism import Mechanism
 from lab.joints.programme import draw_tests, reference
 from lab.trials import batch, sealing
 from lab.trials.scorecard import Case, read_cases, score
@@ -67,7 +68,7 @@ def test_every_effect_changes_what_is_read_and_leaves_it_finite(machine: str) ->
         test['duration_s'] = 8.0
     healthy = moved({**truth, 'effects': []}, 0, 0.0)[2]
     for key, cause in {**kind.catalogue, **kind.outside}.items():
-        assert set(cause.sets) <= set(kind.mechanism({}, [], 1.0)._fields)
+        assert set(cause.sets) <= set(Mechanism._fields)
         for size in (0.0, 1.0):
             effects = [{'id': key, 'parameters': cause.draw(size, random)}]
             found = moved({**truth, 'effects': effects}, 0, 0.0)[2]

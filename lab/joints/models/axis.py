@@ -6,9 +6,10 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 from simgap.model import (
-    effect, free, Log, machine as own_machine, Numbers, OneTest, push, reading, ripple, shape,
-    size, within, without_gaps,
+    effect, free, known, Log, machine as own_machine, Numbers, OneTest, push, reading, ripple,
+    shape, size, within, without_gaps,
 )
 from simgap.parts import compiled, friction, harmonics, loop, shaping
 from simgap.parts.friction import Friction
@@ -68,13 +69,16 @@ def simulate(n: Numbers, test: OneTest) -> dict[str, Array]:
     out = np.zeros(((time.size - 1) * ticks + 1, 2))
     run(reference, ticks, test.push['carriage'],
         Cascade(30.0, 0.4, 100.0, 0.0, 12.0 * (1.0 + n.limit_change)),
-        Friction(coulomb=n.coulomb, viscous=n.viscous, asymmetry=n.asymmetry,
+        Friction(coulomb=n.coulomb * n.coulomb_share, viscous=n.viscous * n.viscous_share,
+                 asymmetry=n.asymmetry,
                  stribeck=n.stribeck, stribeck_rate=n.stribeck_rate, stribeck_shape=1.0),
         n.mass * (1.0 + n.mass_change), n.friction_slope, n.presliding, n.spring,
         n.constant * (1.0 + n.constant_change), n.current_lag, n.delay,
         (n.ripple_order, (n.ripple_cosine, n.ripple_sine, n.ripple_cosine_2, n.ripple_sine_2)),
         (n.cyclic_order, (n.cyclic_cosine, n.cyclic_sine, n.cyclic_cosine_2, n.cyclic_sine_2)),
         -3000.0 * n.start, reference[0] + n.start, -3000.0 * n.start * n.constant / n.coulomb, out)
+    keep = math.exp(-TICK / max(n.current_filter, 1e-9))
+    out[:, 1] = lfilter([1.0 - keep], [1.0, -keep], out[:, 1], zi=keep * out[:1, 1])[0]
     at = np.arange(time.size) * float(ticks)
     return {'position': np.interp(at - n.position_late * ticks, np.arange(len(out)), out[:, 0]),
             'current': np.interp(at - n.current_late * ticks, np.arange(len(out)), out[:, 1])}
@@ -93,7 +97,9 @@ machine = own_machine(
           'coulomb': within(25.0, 0.3, 'N'), 'viscous': within(150.0, 0.4, 'N s/m'),
           'current_lag': within(5e-4, 0.5, 's'),
           # the recorder asks one channel after the other
-          'position_late': free(0.0, 1.0, 'sample'), 'current_late': free(0.0, 1.0, 'sample')},
+          'current_filter': known(0.0, 's'), 'coulomb_share': known(1.0),
+          'viscous_share': known(1.0), 'position_late': free(0.0, 1.0, 'sample'),
+          'current_late': free(0.0, 1.0, 'sample')},
     per_test={'start': free(-2.5e-4, 2.5e-4, 'm')},
     readings={'position': reading('m', noise=2e-6, model_error=5e-6, column='position_m'),
               'current': reading('A', noise=0.03, model_error=0.015, zero=0.02, gain=0.01,

@@ -6,9 +6,10 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 from simgap.model import (
-    effect, form, free, machine as own_machine, Numbers, OneTest, push, reading, ripple, shape,
-    size, within, without_gaps,
+    effect, form, free, known, machine as own_machine, Numbers, OneTest, push, reading, ripple,
+    shape, size, within, without_gaps,
 )
 from simgap.parts import compiled, coupling, friction, harmonics, loop, shaping, wave
 from simgap.parts.friction import Friction
@@ -73,7 +74,8 @@ def simulate(n: Numbers, test: OneTest) -> dict[str, Array]:
     turn = 2.0 * math.pi * n.hung_hz
     run(reference, ticks, test.push['load'],
         Cascade(20.0, 200.0, 0.4, 0.1, 8.0 * (1.0 + n.limit_change)),
-        Friction(coulomb=n.coulomb, viscous=n.viscous, asymmetry=n.asymmetry,
+        Friction(coulomb=n.coulomb * n.coulomb_share, viscous=n.viscous * n.viscous_share,
+                 asymmetry=n.asymmetry,
                  stribeck=n.stribeck, stribeck_rate=n.stribeck_rate, stribeck_shape=1.0),
         (n.motor, n.load * (1.0 + n.load_change) - third, third),
         (n.stiffness / (1.0 + n.softness), n.damping, n.half_gap),
@@ -83,6 +85,8 @@ def simulate(n: Numbers, test: OneTest) -> dict[str, Array]:
         (n.weight_cosine, n.weight_sine),
         (n.cyclic_order, (n.cyclic_cosine, n.cyclic_sine, n.cyclic_cosine_2, n.cyclic_sine_2)),
         n.integral, reference[0] + n.start, out)
+    keep = math.exp(-TICK / max(n.current_filter, 1e-9))
+    out[:, 1] = lfilter([1.0 - keep], [1.0, -keep], out[:, 1], zi=keep * out[:1, 1])[0]
     at = np.arange(time.size) * float(ticks)
     return {'angle': np.interp(at - n.angle_late * ticks, np.arange(len(out)), out[:, 0]),
             'current': np.interp(at - n.current_late * ticks, np.arange(len(out)), out[:, 1])}
@@ -97,7 +101,9 @@ machine = own_machine(
           'coulomb': within(0.03, 0.3, 'N m', step=2e-4),
           'viscous': within(8e-4, 0.4, 'N m s/rad'), 'current_lag': within(5e-4, 0.5, 's'),
           # the recorder asks one channel after the other
-          'angle_late': free(0.0, 1.0, 'sample'), 'current_late': free(0.0, 1.0, 'sample')},
+          'current_filter': known(0.0, 's'), 'coulomb_share': known(1.0),
+          'viscous_share': known(1.0), 'angle_late': free(0.0, 1.0, 'sample'),
+          'current_late': free(0.0, 1.0, 'sample')},
     per_test={'start': free(-0.05, 0.05, 'rad'), 'integral': free(-0.6, 0.6, 'A')},
     readings={'angle': reading('rad', noise=1e-3, model_error=2e-3, column='motor_rad'),
               'current': reading('A', noise=0.02, model_error=0.01, zero=0.02, gain=0.01,
