@@ -131,7 +131,7 @@ def test_a_law_that_noise_could_pass_for_is_no_noise() -> None:
     assert diagnose(Turning(NOTHING, NOTHING)).word == 'no_gap'
 
 
-def both(first: FloatArray, second: FloatArray) -> Turning:
+def both(first: FloatArray, second: FloatArray) -> Machine:
     """Return a machine in two tests, in which a force on the left does the one and the other."""
     machine = Turning(first, NOTHING)
     return machine.with_experiments([*machine.experiments, replace(
