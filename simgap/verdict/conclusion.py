@@ -53,8 +53,9 @@ def concluded(machine: Machine, progress: Callable[[float, str], None], threads:
     law = lawful_fit(found, places, threads)
     decision = verdict.decide(found, places, law.gained if law else 0.0, enough(found.problem))
     if law and law.gained > 0.0:
-        places = [law.place, *(replace(place, law=None) for place in places
-                               if place.name != law.place.name)]
+        places = sorted([law.place, *(replace(place, law=None) for place in places
+                                      if place.name != law.place.name)],
+                        key=lambda place: -place.explained)
     elif decision.unknown >= settings.verdict.partly:
         # a place is not to blame for what pulses cannot follow, nor for more than its everyday
         machine = machine.with_experiments([replace(e, process=None) for e in machine.experiments])

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from simgap.fit.least_squares import LeastSquares
-from simgap.fit.noise import with_noise_left
+from simgap.fit.noise import with_model_error, with_noise_left
 from simgap.machine.contract import FloatArray
 from simgap.machine.with_law import Law, WithLaw
 from simgap.search import moves
@@ -50,10 +50,11 @@ def lawful_fit(found: Found, places: Sequence[Place], threads: int = 1) -> Lawfu
     begun = replace(base, state=problem.start(base.state.parameters, base.state.point()))
     machine, law = _added(problem, begun, place, place.law)
     settings = problem.settings
-    # at the noise that the law leaves, all are compared
-    problem = LeastSquares(with_noise_left(
-        machine, law.state.point(), settings.noise, settings.noise.greatest_level),
-        settings=settings)
+    # all are compared at the noise that the law leaves, with the error that every model has
+    left = with_noise_left(machine, law.state.point(), settings.noise,
+                           settings.noise.greatest_level)
+    problem = LeastSquares(left.with_experiments(with_model_error(
+        left.experiments, settings.noise)), settings=settings)
     law = replace(law, state=problem.fit(problem.start(
         law.state.parameters, law.state.point()), settings.search.iterations))
     slopes = law.state.jacobian[:, :len(problem.machine.nuisances)]

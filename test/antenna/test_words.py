@@ -32,6 +32,7 @@ def what(effect: str, **numbers: dict[str, Any]) -> str:
 def told(effect: str, parameters: dict[str, Any]) -> str:
     verdict: Any = SimpleNamespace(
         word='explained', which=[Named([effect], 0.95, parameters)], confusable=[], planning={},
+        reproducibility=[],
         machine=SimpleNamespace(catalogue=EFFECTS, words=WORDS),
         how_far={'judged': [], 'explained_fraction': {'value': None}})
     return said(verdict).what
