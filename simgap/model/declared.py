@@ -76,6 +76,7 @@ class Push:
     label: str  # for people
     unit: str  # of what enters
     size: float  # what moves the machine a little, well above noise and below limits
+    everyday: float = 0.0  # rms of what acts there every day, such as a wind
 
 
 @dataclass(frozen=True)

@@ -49,7 +49,8 @@ class OwnMachine(Machine):
             **{f'{item.name}.{name}': (name, None) for item in model.effects
                for name, _ in absent(item)}}
         self.disturbance_inputs = tuple(
-            DisturbanceInput(item.label, item.component, unit=item.unit, size=item.size)
+            DisturbanceInput(item.label, item.component, unit=item.unit, size=item.size,
+                             everyday=item.everyday / item.size)
             for item in model.push.values())
         self.advice = tuple(((), text) for text in model.advice)
         self.diagram = _diagram(model)

@@ -313,7 +313,8 @@ def _reading(key: str, body: Mapping[str, Any]) -> Reading:
 def _push(key: str, name: str, body: Mapping[str, Any]) -> Push:
     return Push(_text(f'{key}.component', body.get('component', name)),
                 _text(f'{key}.label', body.get('label', name)), _unit(key, body),
-                _number(f'{key}.size', body.get('size'), _POSITIVE))
+                _number(f'{key}.size', body.get('size'), _POSITIVE),
+                _number(f'{key}.everyday', body.get('everyday', 0.0), Entry('', 0.0)))
 
 
 def _bodies(where: str, top: Mapping[str, Any], allowed: Collection[str] | None = None,

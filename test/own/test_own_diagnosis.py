@@ -12,8 +12,8 @@ from own.swing import log_of, logs, NOISE, simulate, swing, TIME
 import pytest
 from simgap.errors import UserError
 from simgap.model import (
-    diagnose_logs, effect, free, known, Log, machine, OwnMachine, reading, ripple, size, unseen,
-    within,
+    diagnose_logs, effect, free, known, Log, machine, OwnMachine, push, reading, ripple, size,
+    unseen, within,
 )
 from simgap.report.page import contents
 from simgap.report.render import render
@@ -110,6 +110,26 @@ def test_what_pushes_is_told_with_its_place_its_times_and_its_size() -> None:
             assert (item['from_s'], item['until_s']) == pytest.approx(edge, abs=0.05)
             assert item['size'] == pytest.approx(0.05, rel=0.15)
     assert 'far: wind on the swing 0.0' in found.summary()
+
+
+@pytest.mark.parametrize('everyday, drift, word', [
+    (0.0, 0.0, 'unknown_effect'), (0.004, 0.0, 'no_gap'), (0.004, 0.01, 'explained')])
+def test_what_pushes_every_day_is_no_gap(everyday: float, drift: float, word: str) -> None:
+    """A wind of four times the noise, which changes within half a second."""
+    random = np.random.default_rng(4)
+    fades = np.exp(-np.arange(400) / 60.0)
+    winds = [np.convolve(random.normal(size=TIME.size + 400), fades, 'same')[200:-200]
+             for _ in range(2)]
+    recorded = [log_of(name, start, seed, {'drift': drift}, 0.004 * wind / wind.std())
+                for seed, (name, start, wind) in enumerate(zip(
+                    ('far', 'near'), (1.0, 0.6), winds, strict=True))]
+    found = diagnose_logs(swing(push={
+        'wind': push('swing', 'wind on the swing', 'rad', 0.05, everyday)}), recorded)
+    assert found.word == word
+    if drift:
+        assert found.which[0].effects == ['sensor.drift']
+        assert found.which[0].parameters['sensor.drift.drift']['value'] == pytest.approx(
+            drift, rel=0.1)
 
 
 def test_a_log_that_was_not_used_is_predicted_to_the_noise_with_the_effect_only() -> None:
