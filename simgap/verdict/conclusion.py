@@ -4,6 +4,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+import math
 from statistics import fmean
 from typing import Any
 
@@ -51,7 +52,8 @@ def concluded(machine: Machine, progress: Callable[[float, str], None], threads:
     judged = LeastSquares(stated, settings=settings)
     places = unknown_input.places(judged, point, judged.as_stated())
     law = lawful_fit(found, places, threads)
-    decision = verdict.decide(found, places, law.gained if law else 0.0, enough(found.problem))
+    decision = verdict.decide(found, places, law.gained if law else -math.inf,
+                              enough(found.problem))
     if law and law.gained > 0.0:
         places = sorted([law.place, *(replace(place, law=None) for place in places
                                       if place.name != law.place.name)],

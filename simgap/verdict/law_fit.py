@@ -21,7 +21,9 @@ from simgap.search import moves
 from simgap.search.evidence import Evidence
 from simgap.search.hypothesis import Hypothesis
 from simgap.search.search import Found
+from simgap.settings import IntervalSettings
 from simgap.verdict.held_out import held_out
+from simgap.verdict.intervals import covariance
 from simgap.verdict.law import quantities_of, REACHED
 from simgap.verdict.unknown_input import Place, readings_of
 
@@ -58,8 +60,8 @@ def lawful_fit(found: Found, places: Sequence[Place], threads: int = 1) -> Lawfu
     law = replace(law, state=problem.fit(problem.start(
         law.state.parameters, law.state.point()), settings.search.iterations))
     slopes = law.state.jacobian[:, :len(problem.machine.nuisances)]
-    rivals = [moves.refitted(problem, h, law, slopes) for h in {id(h): h for h in (
-        base, found.none)}.values()]
+    rivals = [moves.refitted(problem, h, law, slopes)
+              for h in ([base, found.none] if base.effects else [base])]
     evidence = Evidence.among(problem, [law, *rivals])
     rival = max(rivals, key=evidence)
     gained = evidence(law) - evidence(rival)
@@ -68,7 +70,8 @@ def lawful_fit(found: Found, places: Sequence[Place], threads: int = 1) -> Lawfu
         withheld = held_out(problem, rivals[-1], law, threads)['explained_fraction']['value']
     return LawfulFit(replace(
         place, evidence=max(gained, 0.0), explained=max(1.0 - law.cost / rival.cost, 0.0),
-        law=_as_fitted(place.law, law, machine.reached, gained, withheld)), gained)
+        law=_as_fitted(place.law, law, machine.reached, gained, withheld,
+                       settings.interval)), gained)
 
 
 def _added(problem: LeastSquares, base: Hypothesis, place: Place,
@@ -93,12 +96,10 @@ def _added(problem: LeastSquares, base: Hypothesis, place: Place,
 
 
 def _as_fitted(law: Law, found: Hypothesis, reached: FloatArray, gained: float,
-               withheld: float | None) -> Law:
+               withheld: float | None, settings: IntervalSettings) -> Law:
     """Return a law as it was fitted, where the motion that it makes has reached it."""
     state = found.state
-    spread = np.sqrt(np.diag(np.linalg.pinv(
-        state.hessian + np.diag([p.prior_sigma ** -2.0 if p.prior_sigma else 0.0
-                                 for p in state.parameters]), hermitian=True)).clip(0.0))
+    spread = np.sqrt(np.diag(covariance(state, 1.0, settings)))
     there = reached > REACHED * reached.max()
     own = np.flatnonzero([p in found.forms[-1].parameters for p in state.parameters])[there]
     return replace(law, evidence=gained, at=tuple(np.array(law.at)[there].tolist()),

@@ -42,7 +42,7 @@ def places(problem: LeastSquares, point: Mapping[str, float],
     """
     evidence = InputEvidence.at(problem, point)
     for_laws = InputEvidence.at(plain, point) if plain else None
-    quantities = quantities_of(problem, point)
+    quantities = quantities_of(problem, point) if plain else {}
     found = []
 
     def judged(place: DisturbanceInput, responses: Sequence[FloatArray],

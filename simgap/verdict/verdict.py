@@ -48,7 +48,7 @@ def decide(found: Found, places: Sequence[Place], gained: float, enough: bool) -
     """
     Conclude from a search and what an unknown input would explain.
 
-    gained : evidence for a law beyond that for the best hypothesis; 0 without a law
+    gained : evidence for a law beyond that for the best hypothesis; -inf without a law
     enough : whether data suffice
     """
     settings = found.problem.settings.verdict
@@ -85,7 +85,7 @@ def unknown_probability(found: Found, places: Sequence[Place], gained: float) ->
     explained = max((place.explained for place in places), default=0.0) * (
         0.5 * found.evidence.samples / found.evidence.whole)
     beyond = math.log(max(explained, 1e-9) / settings.left) / settings.left_width
-    share = 0.5 * (1.0 + math.tanh(0.5 * max(beyond, gained or -math.inf)))
+    share = 0.5 * (1.0 + math.tanh(0.5 * max(beyond, gained)))
     return settings.least_unknown + (settings.most_unknown - settings.least_unknown) * share
 
 

@@ -114,10 +114,10 @@ def test_an_effect_within_its_tolerance_is_not_named() -> None:
     none, small = fitted(20000.0), fitted(19000.0, 'motor.gain', within='motor.gain')
     [answer] = ranked(found(none, small), 0.05)
     assert answer.effects == () and answer.probability == pytest.approx(0.95)
-    assert decide(found(none, small), [], 0.0, True).word == 'no_gap'
+    assert decide(found(none, small), [], -math.inf, True).word == 'no_gap'
     assert also_seen(found(none, small)) == [
         {'effect': 'motor.gain', 'gain': 1000.0, 'share': 1.0}]
-    assert decide(found(none, small), [], 0.0, False).word == 'too_few_to_judge'
+    assert decide(found(none, small), [], -math.inf, False).word == 'too_few_to_judge'
 
 
 def test_a_partner_within_its_tolerance_leaves_the_first_effect_alone() -> None:
@@ -181,7 +181,7 @@ def test_the_more_an_unknown_input_explains_the_likelier_is_the_unknown(
         one: float, other: float, named: bool) -> None:
     best = [fitted(1000.0, 'axis.inertia')] if named else []
     searched = found(fitted(20000.0), *best)
-    little, much = (unknown_probability(searched, [place(share), place(0.0)], 0.0)
+    little, much = (unknown_probability(searched, [place(share), place(0.0)], -math.inf)
                     for share in sorted([one, other]))
     assert SETTINGS.least_unknown <= little <= much <= SETTINGS.most_unknown
 
@@ -189,9 +189,9 @@ def test_the_more_an_unknown_input_explains_the_likelier_is_the_unknown(
 def test_the_place_that_explains_most_tells_of_the_unknown() -> None:
     searched = found(fitted(20000.0), fitted(1000.0, 'axis.inertia'))
     places = [place(0.05), place(0.17)]
-    assert unknown_probability(searched, places, 0.0) == unknown_probability(
-        searched, places[1:], 0.0)
-    assert unknown_probability(searched, [], 0.0) == pytest.approx(SETTINGS.least_unknown)
+    assert unknown_probability(searched, places, -math.inf) == unknown_probability(
+        searched, places[1:], -math.inf)
+    assert unknown_probability(searched, [], -math.inf) == pytest.approx(SETTINGS.least_unknown)
     # a law counts by what it makes likelier, which may be less
     lawful = [unknown_probability(searched, [], gained) for gained in (-50.0, -1.0, 1.0, 50.0)]
     assert lawful == sorted(lawful)
@@ -205,7 +205,7 @@ def test_the_word_of_a_verdict_follows_from_the_unknown(explained: float, word: 
     searched = found(fitted(20000.0), fitted(1000.0, 'axis.inertia'))
     # it is a share of the whole gap, and places say theirs of what is left
     left = 0.5 * searched.evidence.samples / searched.evidence.whole
-    decision = decide(searched, [place(explained / left)], 0.0, True)
+    decision = decide(searched, [place(explained / left)], -math.inf, True)
     assert decision.word == word
     named = statements(decision)['named']
     assert named['effects'] == (['unknown'] if word == 'unknown_effect' else ['axis.inertia'])
@@ -222,7 +222,7 @@ def test_effects_whose_exchange_costs_hardly_more_are_confusable() -> None:
 
 def test_the_answers_of_a_verdict_are_one_in_all_with_none_and_unknown() -> None:
     searched = found(fitted(20000.0), fitted(1000.0, 'axis.inertia'), fitted(1002.0, 'axis.gain'))
-    entries = which(decide(searched, [], 0.0, True), SETTINGS)
+    entries = which(decide(searched, [], -math.inf, True), SETTINGS)
     assert [entry['effects'] for entry in entries] == [
         ['axis.inertia'], ['axis.gain'], ['unknown'], ['none']]
     assert sum(entry['probability'] for entry in entries) == pytest.approx(1.0)
