@@ -38,8 +38,9 @@ from std_msgs.msg import String
 _LONGEST_WAIT_S = 0.2
 # How long a node that ends waits for others to receive its last frames [s]. A process that did not
 # run has lost what its port of shared memory had no room for. It gets that again 256 frames at a
-# time, and each time takes half a second by config/fastdds.xml, more on a busy machine.
-_DELIVERY_S = 3.0
+# time, and each time takes half a second by config/fastdds.xml, more on a busy machine. A launch
+# grants five seconds before it sends the next signal.
+_DELIVERY_S = 4.5
 
 _AMPERES = 'armature.physical_amperes_per_article_ampere'
 

@@ -314,7 +314,7 @@ def test_what_a_node_has_sent_before_it_ends_reaches_a_busy_recorder(
         leaving.send_signal(signal.SIGTERM)
         time.sleep(0.3)
         process.process.send_signal(signal.SIGCONT)
-        assert leaving.wait(5.0) == 0
+        assert leaving.wait(10.0) == 0
         drive.processes.start('motor_1')
         drive.until(lambda: len(drive.runs) == 2 and drive.step > 100)
         assert process.end() == 0, process.lines
