@@ -108,14 +108,6 @@ class VerdictSettings:
 
 
 @dataclass(frozen=True)
-class LackOfFitSettings:
-    """Statistics of the residual that a hypothesis leaves."""
-
-    block: int = _at(10, 'samples', 'length of the blocks whose means are the slow part')
-    lags: int = _at(20, 'samples', 'greatest lag of the autocorrelation')
-
-
-@dataclass(frozen=True)
 class NoiseSettings:
     """The noise that a recording shows, and the error that every model has."""
 
@@ -190,7 +182,6 @@ class Settings:
     evidence: EvidenceSettings = EvidenceSettings()
     verdict: VerdictSettings = VerdictSettings()
     noise: NoiseSettings = NoiseSettings()
-    lack_of_fit: LackOfFitSettings = LackOfFitSettings()
     interval: IntervalSettings = IntervalSettings()
     localisation: LocalisationSettings = LocalisationSettings()
     held_out: HeldOutSettings = HeldOutSettings()

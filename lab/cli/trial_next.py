@@ -8,9 +8,8 @@ independent antenna.
 
   --kind third        cases whose first two recordings leave the answer open (best answer below
                       0.7, or a set of effects that they cannot tell apart) get a third test of
-                      30 s by each rule: as `antenna-drive propose` designs it, D-optimal, at
-                      random, and the four kinds of the standard programme, of which the best
-                      counts in hindsight
+                      30 s by each rule: as `antenna-drive propose` designs it, and the four
+                      kinds of the standard programme, of which the best counts in hindsight
   --kind investigate  each case is investigated from nothing by `antenna-drive investigate`, with
                       up to four tests of 30 s, beside a standard programme of three; what counts
                       is the number of tests until an answer is 0.9 sure, and until one test more

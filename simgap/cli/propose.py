@@ -58,8 +58,6 @@ def add_proposal_options(parser: argparse.ArgumentParser) -> None:
                         help='tests that are simulated at once (default: 2)')
     parser.add_argument('--seed', type=int, default=0, metavar='N',
                         help='of the tests that are drawn (default: 0)')
-    parser.add_argument('--rule', choices=('d-optimal', 'random'),
-                        help='choose by another rule, to compare with it')
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -88,7 +86,7 @@ def proposed(arguments: argparse.Namespace, tests: Callable[[dict[str, Any]], Te
     from simgap.next_test.proposal import as_data, contents, lines
     from simgap.next_test.rivals import Findings
     findings = findings_of(arguments.verdict, planning) if planning else Findings()
-    objective = arguments.rule or arguments.objective or objective_for(findings)
+    objective = arguments.objective or objective_for(findings)
     space = tests(planning)
     began = time.monotonic()
     with Progress('proposal', 1.0) as progress:

@@ -22,8 +22,6 @@ from simgap.next_test.space import TestSpace
 from simgap.settings import DEFAULT
 
 SEPARATE, SHARPEN, DETECT = 'separate', 'sharpen', 'detect'
-# Rules to compare with: all numbers of the likeliest rival sharpened alike, and none at all.
-D_OPTIMAL, RANDOM = 'd-optimal', 'random'
 CRITERIA: Mapping[str, str] = {
     SEPARATE: 'T-optimality with prior probabilities: expected information between the rivals, '
               'all tolerances free; weighted by how likely none of them is true, the rule of '
@@ -31,9 +29,7 @@ CRITERIA: Mapping[str, str] = {
     SHARPEN: "D_s-optimality: determinant of the covariance of the likeliest rival's effects, all "
              'tolerances free',
     DETECT: 'smallest size of each effect that shows beside all tolerances, in the tests so far '
-            'or in this one, over that with the best test that was tried, in the geometric mean',
-    D_OPTIMAL: "D-optimality: determinant of the covariance of all the likeliest rival's numbers",
-    RANDOM: 'none: the first test within the limits'}
+            'or in this one, over that with the best test that was tried, in the geometric mean'}
 # Less information than this does not count [nat].
 _NOTHING = 1e-6
 # An effect that does not show at any size is as bad as this many times the best.
@@ -80,7 +76,6 @@ class TestDesign:
         effort = self._effort
         drawn = [Candidate(family, self._space.draw(family, self._random), {})
                  for _ in range(effort.drawn) for family in self._space.families]
-        judged: list[Candidate] = []
         beyond: Sequence[Candidate] = ()
         with one_blas_thread(), ThreadPoolExecutor(self._threads) as pool:
             def each(do: Callable[[Candidate], Candidate], tests: Sequence[Candidate],
@@ -92,16 +87,12 @@ class TestDesign:
             screened = list(each(self._screened, drawn, 0.0, 0.3))
             allowed, refused = ([test for test in screened if (
                 test.tightest[1] <= effort.margin) == keeps] for keeps in (True, False))
-            if self._objective == RANDOM:
-                helpful = [allowed[i] for i in self._random.permutation(len(allowed))[:1]]
-            else:
-                most = effort.fitted if self._objective == SEPARATE else effort.judged
-                judged = self._compared(each(
-                    self._judged, of_each_family(allowed, most), 0.3, 1.0))
-                helpful = [test for test in judged if _helps(test)]
-                if not helpful:
-                    beyond = self._compared(pool.map(
-                        self._judged, of_each_family(refused, effort.beyond)))
+            most = effort.fitted if self._objective == SEPARATE else effort.judged
+            judged = self._compared(each(self._judged, of_each_family(allowed, most), 0.3, 1.0))
+            helpful = [test for test in judged if _helps(test)]
+            if not helpful:
+                beyond = self._compared(pool.map(
+                    self._judged, of_each_family(refused, effort.beyond)))
         progress(1.0)
         return Proposal(
             self._objective, CRITERIA[self._objective], self._rivals, helpful,
@@ -128,10 +119,9 @@ class TestDesign:
     def _judged(self, test: Candidate) -> Candidate:
         """Judge a test with all tolerances free."""
         machine = with_process(self._planned(test))
-        if self._objective in (SHARPEN, D_OPTIMAL):
+        if self._objective == SHARPEN:
             score, found = sharpening(
-                machine, max(self._rivals, key=lambda rival: rival.probability), self._inflated,
-                every=self._objective == D_OPTIMAL)
+                machine, max(self._rivals, key=lambda rival: rival.probability), self._inflated)
             return replace(test, score=score, deviations=found)
         test = replace(test, sizes=self._sizes(machine))
         return test if self._objective == DETECT else replace(

@@ -82,17 +82,17 @@ def separation(machine: Machine, rivals: Sequence[Rival], inflated: float,
     return Separation(prior, lack, dict(zip(channels, parts.tolist(), strict=True)), ends)
 
 
-def sharpening(machine: Machine, rival: Rival, inflated: float,
-               every: bool) -> tuple[float, dict[str, tuple[float, float]]]:
+def sharpening(machine: Machine, rival: Rival,
+               inflated: float) -> tuple[float, dict[str, tuple[float, float]]]:
     """
-    Return how well planned tests determine a rival's effects, or all its numbers if `every`.
+    Return how well planned tests determine a rival's effects, or all its numbers if it has none.
 
     That is the fall of the logarithm of a deviation, summed over all directions, and the standard
     deviations before and after the tests, by number.
     """
     fit = _Fit(_planned(machine, known_to(machine, rival)), rival, inflated)
     own = {p.name for form in rival.forms_of(machine) for p in form.parameters}
-    wanted = [j for j in fit.known if every or fit.numbers[j].name in own] or fit.known
+    wanted = [j for j in fit.known if fit.numbers[j].name in own] or fit.known
     names = [fit.numbers[j].name for j in wanted]
     hessian = fit.first[1]
     unit = np.sqrt(np.outer(np.diag(hessian), np.diag(hessian)))

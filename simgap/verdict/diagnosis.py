@@ -20,7 +20,7 @@ from simgap.verdict import localisation, verdict
 from simgap.verdict.conclusion import concluded
 from simgap.verdict.intervals import values_with_intervals
 from simgap.verdict.interventions import interventions
-from simgap.verdict.lack_of_fit import remainders, residual_tests
+from simgap.verdict.lack_of_fit import remainders
 from simgap.verdict.record import Named, Verdict
 from simgap.verdict.reproducibility import reproducibility
 from simgap.verdict.unknown_input import components
@@ -78,7 +78,6 @@ def _diagnose(machine: Machine, progress: Progress, threads: int, settings: Sett
     progress(1.0, 'done')
     return Verdict(
         word=decision.word,
-        statements=verdict.statements(decision),
         where=located,
         which=[Named(**answer) for answer in verdict.which(
             decision, settings.verdict, lambda answer: values_with_intervals(
@@ -88,7 +87,6 @@ def _diagnose(machine: Machine, progress: Progress, threads: int, settings: Sett
         how_far=found.reach,
         could_hide=hidden if healthy else [],
         remains=remainders(problem, best.state, limits),
-        residual_tests=residual_tests(problem, best.state),
         may_enter_at=[place for place in found.places if unsure and place.evidence > 0.0],
         fits=[{'effects': list(h.effects), 'cost': h.cost, 'log_evidence': found.found.evidence(h)}
               for h in found.found.hypotheses],

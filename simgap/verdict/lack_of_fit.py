@@ -6,30 +6,9 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from simgap.fit import residual_statistics as statistics
 from simgap.fit.least_squares import LeastSquares
 from simgap.fit.process_noise import without_process
 from simgap.fit.state import FitState
-
-
-def _slow_excess(problem: LeastSquares, state: FitState) -> float:
-    """Return the slow excess of the residual, averaged over tests and signals."""
-    # It is relative to white noise with the same fast part, so that a sensor that is noisier than
-    # its sheet says raises no alarm.
-    settings = problem.settings
-    found = []
-    for k, experiment in enumerate(problem.experiments):
-        z = problem.residuals_of(state, k)
-        for c, channel in enumerate(experiment.channels):
-            count = np.isfinite(z[:, c]).sum()
-            # at rest the residual of a quantised reading is a fraction of a digit, and not noise
-            if channel in experiment.quantised or not count:
-                continue
-            # few samples have no slow part: their size alone speaks
-            found.append(statistics.slow_excess(z[:, c], settings)
-                         if count > settings.noise.least_samples
-                         else statistics.power(z[:, c], settings) - 1.0)
-    return float(np.mean(found)) if found else 0.0
 
 
 def enough(problem: LeastSquares) -> bool:
@@ -66,23 +45,3 @@ def remainders(problem: LeastSquares, state: FitState,
         found[channel] = {'unit': unit, 'rms': rms, 'noise': usual, 'beyond_noise': beyond,
                           'matters': (beyond > limits[channel] if channel in limits else None)}
     return found
-
-
-def residual_tests(problem: LeastSquares, state: FitState) -> dict[str, Any]:
-    """Return the residual of every signal, for the JSON."""
-    settings = problem.settings
-    signals: dict[str, Any] = {}
-    count = len(problem.experiments)
-    zs = [problem.residuals_of(state, k) for k in range(count)]
-    channels = problem.experiments[0].channels
-    for c, channel in enumerate(channels):
-        z = np.concatenate([part[:, c] for part in zs])
-        if np.isfinite(z).any():
-            signals[channel] = {
-                'rms': float(np.sqrt(np.nanmean(z ** 2))),
-                'slow_excess': float(np.mean([
-                    statistics.slow_excess(part[:, c], settings) for part in zs])),
-                'greatest_correlation': max(
-                    statistics.autocorrelation(part[:, c], settings) for part in zs),
-            }
-    return {'excess_over_noise': _slow_excess(problem, state), 'signals': signals}

@@ -15,9 +15,6 @@ from simgap.verdict.reproducibility import lines as lines_of_days
 from simgap.verdict.sentence import beyond, headline, loud, said
 from simgap.verdict.unknown_input import Place
 
-# An effect of more parameters than this is summed up instead of listed.
-_LISTED = 12
-
 
 @dataclass(frozen=True)
 class Named:
@@ -34,7 +31,6 @@ class Verdict:
     """What a diagnosis found. docs/diagnosis.md explains each entry of the JSON."""
 
     word: str  # no_gap, too_few_to_judge, explained, partly_explained or unknown_effect
-    statements: Mapping[str, Any]  # what is named beside its runner-up
     where: Sequence[Located]  # shares of the gap by part, signal and regime
     which: Sequence[Named]  # the answers, the likeliest first
     also_seen: Sequence[Mapping[str, Any]]  # effects that show a little
@@ -43,7 +39,6 @@ class Verdict:
     # the least size of each effect that would have shown, if no gap does
     could_hide: Sequence[Mapping[str, Any]]
     remains: Mapping[str, Any]  # what is not explained, by signal
-    residual_tests: Mapping[str, Any]
     may_enter_at: Sequence[Place]  # places where an unknown input may act, the likeliest first
     fits: Sequence[Mapping[str, Any]]  # every fit that the verdict was decided on
     planning: Mapping[str, Any]  # what the design of a further test needs
@@ -103,7 +98,9 @@ class Verdict:
 
 def _closed(verdict: Verdict) -> list[str]:
     """Return how much of the gap is closed, and by what."""
-    far, named = verdict.how_far, verdict.statements['named']['best_of_catalogue']
+    far, known = verdict.how_far, next(
+        answer.effects for answer in verdict.which if answer.effects != ['unknown'])
+    named = [effect for effect in known if effect != 'none']
     judged = [effect for effect in named if effect in far['judged']]
     fraction = far['explained_fraction']
     if named and fraction['value'] is None:
@@ -136,8 +133,6 @@ def share_text(fraction: Mapping[str, Any]) -> str:
 
 def value_lines(parameters: Mapping[str, Any]) -> list[str]:
     """Return the values of an answer's parameters as people read them, a line each."""
-    if len(parameters) > _LISTED:
-        return [f'{len(parameters)} numbers over time, see the JSON']
     return [f'{name.split(".", 2)[-1]} = {item["value"]:.4g} '
             + ('' if item['unit'] == '1' else f'{item["unit"]} ')
             + f'({item["ci95"][0]:.4g} to {item["ci95"][1]:.4g})'

@@ -128,17 +128,6 @@ def which(decision: Decision, settings: VerdictSettings,
     return sorted(entries, key=lambda entry: -entry['probability'])
 
 
-def statements(decision: Decision) -> dict[str, Any]:
-    """Return what is named beside its runner-up, for the JSON."""
-    known = [(list(answer.effects) or ['none'], answer.probability) for answer in decision.answers]
-    first, second, *_ = [*sorted([*known, (['unknown'], decision.unknown)],
-                                 key=lambda item: -item[1]), ([], 0.0)]
-    return {'named': {
-        'effects': first[0], 'probability': first[1],
-        'runner_up': {'effects': second[0], 'probability': second[1]},
-        'best_of_catalogue': list(decision.answers[0].effects)}}
-
-
 def also_seen(found: Found) -> list[dict[str, Any]]:
     """Return effects that show beside what the best names and get no name, for the JSON."""
     named = set(found.best.named)

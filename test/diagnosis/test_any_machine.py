@@ -14,7 +14,7 @@ import pytest
 from scipy.signal import lfilter
 from simgap.machine.contract import Effect, Experiment, FloatArray, Form, Machine, Parameter, Point
 from simgap.verdict.diagnosis import diagnose
-from simgap.verdict.record import share_text
+from simgap.verdict.record import Named, share_text
 
 TIME = np.arange(0.0, 10.0, 0.02)
 NOISE = 0.01
@@ -224,14 +224,13 @@ def test_an_effect_that_widens_the_gap_explains_nothing_of_it() -> None:
 ])
 def test_the_text_says_of_which_effects_a_share_is(judged: list[str], said: list[str]) -> None:
     diagnosis = diagnose(Body({'heater.step.size': -0.3}))
-    named = {**diagnosis.statements['named'], 'best_of_catalogue': ['a', 'b']}
     fraction = ({'value': 0.9, 'ci95': [0.8, 0.99]} if judged else
                 {'value': None, 'reason': 'why'})
-    text = replace(diagnosis, statements={'named': named}, how_far={
+    text = replace(diagnosis, which=[Named(['a', 'b'], 1.0, {})], how_far={
         'explained_fraction': fraction, 'held_out': 'the rest', 'judged': judged,
         'cannot_be_judged': {name: f'why {name}' for name in 'ab' if name not in judged},
     }).summary()
-    assert [line.strip() for line in text.splitlines() if 'of the gap' in line] == said
+    assert [line.strip() for line in text.splitlines() if 'judged on' in line] == said
 
 
 def test_what_closes_nothing_of_withheld_data_is_not_named() -> None:
@@ -241,7 +240,6 @@ def test_what_closes_nothing_of_withheld_data_is_not_named() -> None:
     result = diagnose(body).as_data()
     assert result['verdict'] == 'unknown_effect'
     assert {name for entry in result['which'] for name in entry['effects']} == {'none', 'unknown'}
-    assert result['statements']['named']['best_of_catalogue'] == []
 
 
 @pytest.mark.parametrize('work', [diagnose, rank_hypotheses])

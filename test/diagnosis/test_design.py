@@ -94,18 +94,8 @@ def test_a_strong_load_within_the_limit_is_proposed(objective: str) -> None:
     assert found.criterion == CRITERIA[objective]
     assert all(test.use['load_N'] <= SMALL.margin for test in found.tests)
     assert found.refused['load_N'] > 0
-    if objective != 'random':
-        assert found.tests[0].family == 'strong'
-        assert found.tests[0].test > 0.75
-
-
-def test_a_random_test_may_be_of_any_kind_that_is_allowed() -> None:
-    found = [TestDesign(Loads(2.0), Findings(HARD), 'random', effort=SMALL, seed=seed).run().tests
-             for seed in range(24)]
-    assert all(len(tests) == 1 for tests in found)
-    # of 24 fair choices between two kinds fewer than 3 are of one kind once in 28 000 times
-    strong = sum(tests[0].family == 'strong' for tests in found)
-    assert 3 <= strong <= 21
+    assert found.tests[0].family == 'strong'
+    assert found.tests[0].test > 0.75
 
 
 def test_the_promise_for_the_best_test_is_confirmed_by_fits() -> None:

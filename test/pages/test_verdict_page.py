@@ -55,8 +55,6 @@ FULL: dict[str, Any] = {
     'where': [{'component': HOSTILE, 'signal': 'dial', 'regime': 'reversal', 'share': 0.4}],
     'may_enter_at': [{'name': HOSTILE, 'component': 'dial', 'explained': 0.3,
                       'law': {'by': 'rate', 'times': HOSTILE}}],
-    'residual_tests': {
-        'signals': {HOSTILE: {'rms': 1.0, 'slow_excess': 0.1, 'greatest_correlation': 0.2}}},
     'notes': [HOSTILE], 'seconds': 3.0,
 }
 BARE: dict[str, Any] = {
@@ -83,7 +81,7 @@ def diagnosis(result: dict[str, Any], read: Sequence[int] = (1,), **machine: Any
         **{'diagram': None, 'advice': (), 'words': {},
            'simulate': lambda points: [[true - 1.0] * 2, [true] * 2, [true] * 2], **machine})
     fit: Any = SimpleNamespace(state=SimpleNamespace(point=dict), forms=())
-    entries = {'statements': {}, 'fits': [], 'planning': {}, 'labels': None, **result}
+    entries = {'fits': [], 'planning': {}, 'labels': None, **result}
     return Verdict(**{
         **{key: value for key, value in entries.items() if key != 'verdict'},
         'word': result['verdict'], 'which': [Named(**answer) for answer in result['which']],
@@ -148,9 +146,8 @@ def test_everything_is_said_and_nothing_is_taken_for_html(browser: Page, tmp_pat
 @needs_browser
 def test_the_page_begins_with_the_sentence_and_with_what_was_diagnosed(
         browser: Page, tmp_path: Path) -> None:
-    verdict = diagnosis({**FULL, 'confusable': [], 'statements': {'named': {
-        'best_of_catalogue': ['motors.friction']}}}, words={'motors.friction': lambda numbers: (
-            'the motors rub 50 percent more', ['run `this`', 'look'])})
+    verdict = diagnosis({**FULL, 'confusable': []}, words={'motors.friction': lambda numbers: (
+        'the motors rub 50 percent more', ['run `this`', 'look'])})
     path = tmp_path / 'verdict.html'
     path.write_text(render('verdict.html', **contents(verdict, {
         'machine': HOSTILE, 'recordings': 'a.csv (2026-01-02)', 'made by': 'it 1.0'})))
