@@ -272,16 +272,6 @@ class LeastSquares:
             e.measured.shape), self.settings.fit.outlier).sum(axis=0)
             for k, e in enumerate(self.experiments)], axis=0)
 
-    def beyond_noise(self, residual: FloatArray) -> FloatArray:
-        """Return the losses of each signal beyond what the stated noise leaves, shape (c,)."""
-        levels = [self.scale * np.array([colour.level for colour in e.colours] or 1.0)
-                  for e in self.experiments]
-        power, count = np.sum([[((level * residual[self.rows(k)].reshape(
-            e.measured.shape)) ** 2).sum(axis=0), self.valid[self.rows(k)].reshape(
-                e.measured.shape).sum(axis=0)]
-            for k, (e, level) in enumerate(zip(self.experiments, levels, strict=True))], axis=0)
-        return self.losses(residual) * np.maximum(1.0 - count / np.maximum(power, 1e-30), 0.0)
-
     def cost(self, residual: FloatArray, x: FloatArray, prior: FloatArray) -> float:
         """Return the sum of the robust losses and of the priors, given their precision."""
         return self.loss(residual) + float(0.5 * x @ (prior * x))

@@ -59,8 +59,7 @@ class Evidence:
         ends = np.min([problem.losses(h.state.residual) for h in hypotheses], axis=0)
         return cls(options, problem.samples, temperature(problem, best.state),
                    none.cost - best.cost, problem.scale, problem.losses,
-                   ends + np.minimum(options.form_error ** 2 * np.maximum(begins - ends, 0.0),
-                                     problem.beyond_noise(best.state.residual)))
+                   ends + options.form_error ** 2 * np.maximum(begins - ends, 0.0))
 
     def __call__(self, hypothesis: Hypothesis) -> float:
         """Return the logarithm of the evidence times the prior, with the prices."""
