@@ -143,8 +143,7 @@ class LeastSquares:
         """
         variants, only, plan = [], [], []
         sizes = [steps.get(item.name, item.step) for item in parameters]
-        known = {j: column for j, item in enumerate(parameters)
-                 if (column := self._linear_column(item)) is not None}
+        known = self._linear_columns(parameters)
         places = {item.name: j for j, item in enumerate(parameters)}
         shared = {j: places[item.of] for j, item in enumerate(parameters) if item.of in places}
         for j, item in enumerate(parameters):
@@ -197,17 +196,21 @@ class LeastSquares:
         # a deviation is added to its number in the tests of a label
         return np.repeat([e.labels.get(key, '') == value for e in self.experiments], self.sizes)
 
-    def _linear_column(self, item: Parameter) -> Jacobian | None:
-        """Return the derivative by a number in which the machine is linear; None for another."""
-        if item.name not in self._linear:
-            column = np.zeros(self.valid.size, np.float32)
+    def _linear_columns(self, items: Sequence[Parameter]) -> dict[int, Jacobian]:
+        """Return the derivatives by numbers in which the machine is linear, by their places."""
+        fresh = [p for p in items if p.name not in self._linear
+                 and self.machine.linear_response(p.name, 0) is not None]
+        chunk = self.settings.fit.batch
+        for first in range(0, len(fresh), chunk):
+            part = fresh[first:first + chunk]
+            columns = np.zeros((len(part), self.valid.size), np.float32)
             for k in range(len(self.experiments)):
-                if (response := self.machine.linear_response(item.name, k)) is None:
-                    return None
-                change = item.step * response[..., np.newaxis]
-                column[self.rows(k)] = self.whitened(k, change)[:, 0] / item.step
-            self._linear[item.name] = column
-        return self._linear[item.name]
+                columns[:, self.rows(k)] = self.whitened(k, np.stack([
+                    p.step * np.asarray(self.machine.linear_response(p.name, k)) for p in part],
+                    axis=-1)).T
+            self._linear |= {p.name: column / p.step
+                             for p, column in zip(part, columns, strict=True)}
+        return {j: self._linear[p.name] for j, p in enumerate(items) if p.name in self._linear}
 
     def start(self, parameters: Sequence[Parameter], point: dict[str, float],
               jacobian: Jacobian | None = None, central: bool = False) -> FitState:

@@ -90,7 +90,7 @@ class Search:
                 if known is None or h.cost < known.cost:
                     self._found[frozenset(h.effects)] = h
         # derivatives take most of the memory: the best keep theirs
-        for h in self._ranked()[self._options.finalists:]:
+        for h in self._ranked()[self._options.leading:]:
             if h.effects and h.state.base_jacobian.size:
                 self._found[frozenset(h.effects)] = h.without_jacobian()
 
@@ -293,6 +293,11 @@ class Search:
             slopes = best.state.jacobian[:, :len(self._problem.machine.nuisances)]
             self._keep(self._pool.map(
                 lambda h: moves.refitted(self._problem, h, best, slopes), self._ranked()[1:]))
-            self._make([*(partial(moves.dropped, self._problem, best, effect)
-                          for effect in best.effects), partial(moves.joined, self._problem, best)])
+            evidence = self._evidence()
+            self._make(partial(moves.settled, self._problem, h, 1)
+                       for h in self._ranked()[1:options.leading]
+                       if h.effects and evidence(h) > evidence(best) - evidence.reach)
+            self._make([*(partial(moves.dropped, self._problem, h.with_jacobian(self._problem),
+                                  effect) for h in self._ranked() if h.cost <= best.cost
+                          for effect in h.effects), partial(moves.joined, self._problem, best)])
         return Found(self._problem, self._ranked(), self._evidence())

@@ -49,6 +49,9 @@ class Part(Machine):
             rows[i][k] = row[self.chosen[k]]
         return rows
 
+    def linear_response(self, name: str, experiment: int) -> FloatArray | None:
+        return self._machine.linear_response(name, self.chosen[experiment])
+
     def low_fidelity(self) -> Machine:
         faster = self._machine.low_fidelity()
         return self if faster is self._machine else Part(
