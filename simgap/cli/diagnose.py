@@ -9,9 +9,13 @@ verdict.
   simgap diagnose my_machine.py:machine logs/*.csv
   simgap diagnose my_machine.yaml logs/*.csv --map map.yaml --json verdict.json --report page.html
   simgap diagnose my_machine.py logs/*.csv more.csv --after verdict.json
+  simgap diagnose my_machine.py a.csv b.csv --unseen c.csv
 
 --after takes a verdict on some of the logs. Its answers are fitted to all of them, each from where
 its fit had ended, beside what is found afresh.
+
+--unseen is the proof: logs of other tests, predicted with what was found, and with the law of what
+has no name. Nothing is fitted to them.
 """
 
 from __future__ import annotations
@@ -46,6 +50,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--corrected', type=Path, metavar='FILE',
                         help='write the MJCF or URDF that simgap machine-from made the model of, '
                              'with what was found')
+    parser.add_argument('--unseen', nargs='+', default=[], metavar='LOG',
+                        help='logs that nothing is fitted to; how well they are predicted is told')
 
 
 def add_map_option(parser: argparse.ArgumentParser) -> None:
@@ -73,14 +79,16 @@ def add_diagnosis_options(parser: argparse.ArgumentParser, example: str) -> None
 
 def run(arguments: argparse.Namespace) -> int:
     """Diagnose, and write what was asked for; 0 whatever the verdict."""
-    return diagnosed(arguments.model, arguments.logs, arguments)
+    return diagnosed(arguments.model, arguments.logs, arguments, arguments.unseen)
 
 
-def diagnosed(name: str, paths: Sequence[str], arguments: argparse.Namespace) -> int:
-    """Diagnose a machine by its model and its logs; options as in `add_diagnosis_options`."""
+def diagnosed(name: str, paths: Sequence[str], arguments: argparse.Namespace,
+              further: Sequence[str] = ()) -> int:
+    """Diagnose a machine by its model and its logs, and predict further ones."""
     check_options(arguments, jobs=Entry('', 1, whole=True))
     give_back_large_arrays()
-    from simgap.model import diagnose_logs, load_model, read_logs
+    from simgap.model import diagnose_logs, load_model, read_logs, unseen
+    from simgap.model.unseen import lines as lines_of_unseen
 
     model, earlier = load_model(name), earlier_of(arguments.after)
     if arguments.corrected:  # whether it can be done is told before the diagnosis
@@ -88,6 +96,7 @@ def diagnosed(name: str, paths: Sequence[str], arguments: argparse.Namespace) ->
         source = source_of(Path(name), arguments.corrected)
     with reading():
         logs = read_logs(paths, arguments.map)
+        others = read_logs(further, arguments.map) if further else []
     with Progress('diagnosis', 1.0) as progress:
         verdict = diagnose_logs(
             model, logs, lambda share, doing: progress.update(share), arguments.jobs,
@@ -95,7 +104,12 @@ def diagnosed(name: str, paths: Sequence[str], arguments: argparse.Namespace) ->
             dict(numbers_of('--matters', arguments.matters)), earlier)
     write_report(arguments.report, verdict, facts(f'simgap {__version__}', name, '', paths))
     lines = _write_corrected(verdict, arguments.corrected, source) if arguments.corrected else ()
-    give(verdict.as_data(), arguments.json, '\n'.join([verdict.summary(), *lines]))
+    predicted = {log.name: unseen(verdict, log) for log in others}
+    told = [line for log in others for line in lines_of_unseen(verdict, log, predicted[log.name])]
+    data = verdict.as_data() | ({'unseen': {name: {
+        reading: vars(item) for reading, item in found.items()}
+        for name, found in predicted.items()}} if predicted else {})
+    give(data, arguments.json, '\n'.join([verdict.summary(), *told, *lines]))
     return int(verdict.word == 'too_few_to_judge')
 
 

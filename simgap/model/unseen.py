@@ -20,7 +20,13 @@ from simgap.machine.contract import FloatArray, Machine, Point
 from simgap.model.machine import OwnMachine
 from simgap.search.hypothesis import Hypothesis
 from simgap.settings import DEFAULT
+from simgap.verdict.law import quantities_of
+from simgap.verdict.law_fit import LawfulFit
 from simgap.verdict.record import Verdict
+from simgap.verdict.spoken import quantity
+
+# A law moves the machine, and so what it is a function of.
+_ROUNDS = 4
 
 
 @dataclass(frozen=True)
@@ -31,6 +37,7 @@ class Unseen:
     before: float  # fitted by least squares, without any effect
     after: float  # the same with the effects of the best answer
     unit: str
+    lawful: float | None = None  # with the law of what is unknown, too; None without one
 
 
 def unseen(verdict: Verdict, log: Log,
@@ -52,11 +59,49 @@ def unseen(verdict: Verdict, log: Log,
         points = [whole.labels.at(point, log.labels) for point in points]
     readings = [other.pushed(_carried(machine, log.name, point), 0, push or {})
                 for point in points]
+    if verdict.lawful is not None:
+        point = refitted(verdict.lawful.machine, verdict.lawful.hypothesis)
+        if isinstance(whole, ByLabel):
+            point = whole.labels.at(point, log.labels)
+        readings.append(_with_law(verdict.lawful, other, _carried(machine, log.name, point),
+                                  push or {}))
     for j, (name, item) in enumerate(machine.model.readings.items()):
-        configured, before, after = (math.sqrt(float(np.nanmean(
+        configured, before, after, *lawful = (math.sqrt(float(np.nanmean(
             (values[:, j] - measured[:, j]) ** 2))) for values in readings)
-        found[name] = Unseen(configured, before, after, item.unit)
+        found[name] = Unseen(configured, before, after, item.unit, *lawful)
     return found
+
+
+def lines(verdict: Verdict, log: Log, found: Mapping[str, Unseen]) -> list[str]:
+    """Return how well a log is predicted as people read it, a line for each reading."""
+    named = ' and '.join(verdict.best.effects) or 'nothing named'
+    told = [f'  {log.name}, not fitted: {name} is off by {quantity(item.configured, item.unit)} '
+            f'as configured, {quantity(item.before, item.unit)} fitted without effects, '
+            f'{quantity(item.after, item.unit)} with {named}'
+            + ('' if item.lawful is None else
+               f', {quantity(item.lawful, item.unit)} with the law') + ' (rms)'
+            for name, item in found.items()]
+    groups = verdict.machine.labels.groups if isinstance(verdict.machine, ByLabel) else {}
+    return told + [f'  {log.name}: no diagnosed log has {key}: {log.labels.get(key, "")}'
+                   for key, values in groups.items() if log.labels.get(key, '') not in values]
+
+
+def _with_law(lawful: LawfulFit, other: OwnMachine, point: Point,
+              push: Mapping[str, FloatArray]) -> FloatArray:
+    """Return the readings of a log with a law, a function of the motion that it makes itself."""
+    [log], [experiment], place = other.logs, other.experiments, lawful.place
+    values = [point[p.name] for p in lawful.hypothesis.forms[-1].parameters]
+    course = np.zeros(experiment.time.size)
+    for _ in range(_ROUNDS):
+        if place.name in (item.name for item in other.disturbance_inputs):
+            name = other.push_at(place.name)
+            readings = other.pushed(point, 0, {**push, name: push.get(name, 0.0) + np.interp(
+                log.time, experiment.time, course)})
+        else:
+            readings = other.pushed(point, 0, push)
+            readings[:, experiment.channels.index(place.component)] += course
+        course = lawful.law.weights(quantities_of(other, [readings]))[0] @ values
+    return readings
 
 
 def refitted(machine: Machine, hypothesis: Hypothesis) -> dict[str, float]:

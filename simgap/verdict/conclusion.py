@@ -20,7 +20,7 @@ from simgap.verdict.held_out import held_out
 from simgap.verdict.intervals import deviations, inflation, jackknife
 from simgap.verdict.interventions import simplified
 from simgap.verdict.lack_of_fit import enough
-from simgap.verdict.law_fit import lawful_fit
+from simgap.verdict.law_fit import lawful_fit, LawfulFit
 
 
 @dataclass(frozen=True)
@@ -33,6 +33,7 @@ class Conclusion:
     # standard deviations of the effects' values
     deviating: Callable[[Hypothesis], dict[str, float]]
     decision: verdict.Decision  # what follows from it
+    lawful: LawfulFit | None  # the best hypothesis with a law, where that is better
 
 
 def concluded(machine: Machine, progress: Callable[[float, str], None], threads: int,
@@ -62,7 +63,8 @@ def concluded(machine: Machine, progress: Callable[[float, str], None], threads:
         # a place is not to blame for what pulses cannot follow, nor for more than its everyday
         machine = machine.with_experiments([replace(e, process=None) for e in machine.experiments])
         places = unknown_input.places(LeastSquares(machine, settings=settings), point)
-    return Conclusion(found, reach, places, _deviating(found, reach), decision)
+    return Conclusion(found, reach, places, _deviating(found, reach), decision,
+                      law if law and law.gained > 0.0 else None)
 
 
 def _deviating(found: Found, reach: Mapping[str, Any]) -> Callable[[Hypothesis], dict[str, float]]:

@@ -93,4 +93,4 @@ def _diagnose(machine: Machine, progress: Progress, threads: int, settings: Sett
         planning=planning, seconds=time.monotonic() - began,
         notes=machine.notes, labels=labels,
         machine=problem.machine, none=none, best=best,
-        reproducibility=reproducibility(problem, best))
+        reproducibility=reproducibility(problem, best), lawful=found.lawful)

@@ -4,12 +4,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from simgap.fit.least_squares import LeastSquares
-from simgap.machine.contract import FloatArray
+from simgap.machine.contract import FloatArray, Machine
 from simgap.machine.with_law import Law, Quantities, Quantity
 from simgap.verdict.input_evidence import InputEvidence
 
@@ -21,14 +20,18 @@ REACHED = 0.05
 _FACTORS = ('direction', 'load', 'rate')
 
 
-def quantities_of(problem: LeastSquares, point: Mapping[str, float]) -> Quantities:
-    """Return what the machine does, by name, at the samples of each test."""
+def predicted(machine: Machine, point: Mapping[str, float]) -> list[FloatArray]:
+    """Return the readings of each test at a point, shape (n, c)."""
+    return [machine.predict(point, k) for k in range(len(machine.experiments))]
+
+
+def quantities_of(machine: Machine, readings: Sequence[FloatArray]) -> Quantities:
+    """Return what a machine does where it reads so, by name, at the samples of each test."""
     found: dict[str, Quantity] = {}
-    # the motion of the model, because what was measured has noise
-    readings = [problem.machine.predict(point, k) for k in range(len(problem.experiments))]
-    moving = problem.machine.with_experiments([replace(e, measured=own) for e, own in zip(
-        problem.experiments, readings, strict=True)])
-    for k, experiment in enumerate(problem.experiments):
+    # readings are those of a model, because what was measured has noise
+    moving = machine.with_experiments([replace(e, measured=own) for e, own in zip(
+        machine.experiments, readings, strict=True)])
+    for k, experiment in enumerate(machine.experiments):
         motion, predicted = moving.motion(k), readings[k].T
         # a reading counts, where the motion has a quantity of its name
         seen = {name: (motion.unit(name), own) for name, own in motion.covariates().items()}
@@ -37,8 +40,7 @@ def quantities_of(problem: LeastSquares, point: Mapping[str, float]) -> Quantiti
         for name, (unit, own) in seen.items():
             found.setdefault(name, Quantity(unit, [])).values.append(np.asarray(own))
     return {name: item for name, item in found.items()
-            if len(item.values) == len(problem.experiments)
-            and np.ptp(np.concatenate(item.values)) > 0.0}
+            if len(item.values) == len(machine.experiments)}
 
 
 def likeliest(evidence: InputEvidence, square: FloatArray, slope: FloatArray,
@@ -54,7 +56,7 @@ def likeliest(evidence: InputEvidence, square: FloatArray, slope: FloatArray,
     for times, factor in factors.items():
         weight = np.concatenate(factor.values)[:, np.newaxis] if times else 1.0
         for by, quantity in quantities.items():
-            if by == times:
+            if by == times or np.ptp(np.concatenate(quantity.values)) == 0.0:
                 continue
             at, columns = _hats(np.concatenate(quantity.values))
             reached = np.abs(weight * columns).max(axis=0)

@@ -24,7 +24,7 @@ from simgap.search.search import Found
 from simgap.settings import IntervalSettings
 from simgap.verdict.held_out import held_out
 from simgap.verdict.intervals import covariance
-from simgap.verdict.law import quantities_of, REACHED
+from simgap.verdict.law import predicted, quantities_of, REACHED
 from simgap.verdict.unknown_input import Place, readings_of
 
 # A law moves the machine, and so what it is a function of.
@@ -35,8 +35,11 @@ _ROUNDS = 2
 class LawfulFit:
     """The likeliest law beside the best hypothesis, and how much more it makes likely."""
 
-    place: Place  # with the law as it was fitted
+    place: Place  # with the law as it was fitted, where the motion reaches it
     gained: float  # evidence beyond that of the best of the catalogue, with the law's price
+    law: Law  # with all its places, as it was begun with
+    machine: WithLaw
+    hypothesis: Hypothesis  # the best one with the law, whose values are those of its last form
 
 
 def lawful_fit(found: Found, places: Sequence[Place], threads: int = 1) -> LawfulFit | None:
@@ -71,7 +74,7 @@ def lawful_fit(found: Found, places: Sequence[Place], threads: int = 1) -> Lawfu
     return LawfulFit(replace(
         place, evidence=max(gained, 0.0), explained=max(1.0 - law.cost / rival.cost, 0.0),
         law=_as_fitted(place.law, law, machine.reached, gained, withheld,
-                       settings.interval)), gained)
+                       settings.interval)), gained, place.law, machine, law)
 
 
 def _added(problem: LeastSquares, base: Hypothesis, place: Place,
@@ -84,7 +87,8 @@ def _added(problem: LeastSquares, base: Hypothesis, place: Place,
     numbers, point = form.parameters, {**state.point(), **form.start}
     for _ in range(_ROUNDS):
         machine = WithLaw(problem.machine, effect, source, [
-            own / source.size for own in law.weights(quantities_of(lawful, state.point()))])
+            own / source.size for own in law.weights(quantities_of(
+                lawful.machine, predicted(lawful.machine, state.point())))])
         lawful = LeastSquares(machine, scale=problem.scale, settings=problem.settings)
         # one-sided: each difference runs all tests
         columns = lawful.jacobian(point, numbers, lawful.residuals(point), central=False)

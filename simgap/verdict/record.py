@@ -10,6 +10,7 @@ from simgap.inputs.plain import strict_json
 from simgap.machine.contract import Machine
 from simgap.search.hypothesis import Hypothesis
 from simgap.verdict.interventions import lines as lines_of_labels
+from simgap.verdict.law_fit import LawfulFit
 from simgap.verdict.localisation import Located
 from simgap.verdict.reproducibility import lines as lines_of_days
 from simgap.verdict.sentence import beyond, headline, loud, said
@@ -52,6 +53,7 @@ class Verdict:
     best: Hypothesis  # the one with the likeliest effects
     # the numbers of the model: what they are the next time, what differs between days
     reproducibility: Sequence[Mapping[str, Any]] = field(default=(), kw_only=True)
+    lawful: LawfulFit | None = field(default=None, kw_only=True)  # the best one with a law
 
     def __repr__(self) -> str:
         """Return the verdict and its first answer, in a line."""
@@ -62,7 +64,7 @@ class Verdict:
     def as_data(self) -> dict[str, Any]:
         """Return the JSON of docs/diagnosis.md as plain data."""
         entries = {item.name: getattr(self, item.name) for item in fields(self)
-                   if item.name not in ('word', 'machine', 'none', 'best')}
+                   if item.name not in ('word', 'machine', 'none', 'best', 'lawful')}
         return {'verdict': self.word, 'sentence': str(said(self)), **{
             name: entry for name, entry in entries.items() if entry is not None},
             'which': [vars(answer) for answer in self.which],

@@ -13,7 +13,7 @@ from simgap.machine.contract import DisturbanceInput, FloatArray
 from simgap.machine.pulses import answers
 from simgap.machine.with_law import Law
 from simgap.verdict.input_evidence import InputEvidence
-from simgap.verdict.law import likeliest, quantities_of
+from simgap.verdict.law import likeliest, predicted, quantities_of
 
 # Times within which an input changes, in pulses.
 _SMOOTH = (0.0, 5.0)
@@ -42,7 +42,7 @@ def places(problem: LeastSquares, point: Mapping[str, float],
     """
     evidence = InputEvidence.at(problem, point)
     for_laws = InputEvidence.at(plain, point) if plain else None
-    quantities = quantities_of(problem, point) if plain else {}
+    quantities = quantities_of(problem.machine, predicted(problem.machine, point)) if plain else {}
     found = []
 
     def judged(place: DisturbanceInput, responses: Sequence[FloatArray],

@@ -20,7 +20,7 @@ from simgap.search.hypothesis import Hypothesis
 from simgap.search.search import Found
 from simgap.settings import DEFAULT
 from simgap.verdict.diagnosis import diagnose
-from simgap.verdict.law import quantities_of
+from simgap.verdict.law import predicted, quantities_of
 from simgap.verdict.law_fit import lawful_fit, LawfulFit
 from simgap.verdict.law_form import nearest_form
 from simgap.verdict.unknown_input import places
@@ -176,9 +176,10 @@ def test_a_law_has_the_units_of_its_place_and_deviations_that_hold() -> None:
 
 def test_a_reading_that_has_the_name_of_a_quantity_is_that_quantity() -> None:
     machine = Read(NOTHING, NOTHING)
-    found = quantities_of(LeastSquares(machine.with_experiments([
+    twice = machine.with_experiments([
         replace(e, name=name, channels=('angle', 'rate'))
-        for e in machine.experiments for name in 'ab'])), {})
+        for e in machine.experiments for name in 'ab'])
+    found = quantities_of(twice, predicted(twice, {}))
     assert [*map(len, (found['angle'].values, found['rate'].values))] == [2, 2]
     assert (found['angle'].unit, found['load'].unit) == ('m', '')
     np.testing.assert_array_equal(found['rate'].values[1], 2.0 * RATE)

@@ -59,6 +59,22 @@ def test_diagnose_goes_on_from_a_verdict_on_the_recordings_before(
     capsys.readouterr()
 
 
+def test_a_log_that_nothing_is_fitted_to_is_predicted(
+        folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    log = log_of('new', 0.7, 5, {'drift': 0.01})
+    np.savetxt(folder / 'new.csv', np.column_stack(
+        [log.time, log['turn'], log['angle'], log['rate']]), delimiter=',', comments='',
+        header='time_s,turn,angle,rate')
+    assert simgap.cli.main(['diagnose', f'{folder}/model.py:machine', f'{folder}/far.csv',
+                            f'{folder}/near.csv', '--unseen', f'{folder}/new.csv',
+                            '--json', f'{folder}/v.json']) == 0
+    found = json.loads((folder / 'v.json').read_text())['unseen']['new']['angle']
+    # what a bias leaves of a drift of 0.01 t over 20 s
+    assert found['before'] == pytest.approx(0.2 / np.sqrt(12.0), rel=0.1)
+    assert found['after'] < 0.2 * found['before'] and found['lawful'] is None
+    assert 'new, not fitted: angle is off by' in capsys.readouterr().out
+
+
 @pytest.mark.parametrize(('text', 'message'), [
     ('no JSON', 'old.json: no JSON of a diagnosis'),
     ('{"verdict": "no_gap"}', 'old.json: no entry planning: a verdict of an earlier version'),

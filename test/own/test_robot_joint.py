@@ -10,7 +10,7 @@ import runpy
 from typing import Any
 
 import pytest
-from simgap.model import check_model, diagnose_logs, load_model, Log
+from simgap.model import check_model, diagnose_logs, load_model, Log, unseen
 
 FOLDER = Path(__file__).resolve().parents[2] / 'examples' / 'robot_joint'
 MODEL = load_model(str(FOLDER / 'machine.py'))
@@ -60,6 +60,15 @@ def test_an_answer_does_not_turn_with_the_rate_at_which_samples_are_compared(fau
     assert len({tuple(answer.effects) for answer in answers}) == 1
     probabilities = [answer.probability for answer in answers]
     assert max(probabilities) - min(probabilities) < 0.1
+
+
+def test_a_law_in_the_place_of_what_the_list_lacks_predicts_a_log_that_it_never_saw() -> None:
+    """As well as the true effect would; the logs have noise of 0.02 A."""
+    found = diagnose_logs(MODEL, logs_of('asymmetry'), without=['motor.friction_asymmetry'])
+    assert found.word == 'unknown_effect' and found.lawful is not None
+    for log in logs_with(MAKER['FAULTS']['asymmetry'], 7):
+        current = unseen(found, log)['current']
+        assert current.after > 0.07 and current.lawful == pytest.approx(0.02, rel=0.1)
 
 
 def test_what_a_repair_changes_is_told_and_what_it_leaves_too() -> None:
