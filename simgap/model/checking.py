@@ -21,8 +21,9 @@ from simgap.verdict.spoken import quantity
 # simulation is smooth.
 _ROUGH = 0.5
 _LEAST_SAMPLES = 50
-# Simulations of a usual diagnosis, from which its duration is estimated.
-_RUNS = 6000
+# Simulations of all tests in a usual diagnosis, for each number that it may fit: 11 to 55, measured
+# on joints and axes (lab/notebook/performance.md).
+_RUNS_OF_A_NUMBER = 50
 
 
 @dataclass(frozen=True)
@@ -155,5 +156,8 @@ def _remarks(machine: OwnMachine, compiling_s: float) -> Iterator[str]:
                    f'{np.nanmax(measured):.4g}, simulated {np.min(predicted[:, j]):.4g} to '
                    f'{np.max(predicted[:, j]):.4g} {experiment.units[j]}; gap before any fit '
                    f'{_rms(measured - predicted[:, j]):.3g}, noise {experiment.noise[0, j]:.3g}')
+    runs = _RUNS_OF_A_NUMBER * (len(machine.nuisances) + sum(
+        len(machine.catalogue.typical_form(effect).sizes)
+        for effect in machine.catalogue.values()))
     yield (f'one run of all tests takes {run_s:.2g} s (the first one {compiling_s:.2g} s); a '
-           f'diagnosis takes a few thousand, about {_RUNS * run_s / 60.0:.2g} min')
+           f'diagnosis takes about {runs}, {runs * run_s / 60.0:.2g} min')
