@@ -122,6 +122,10 @@ class Machine(ABC):
         """Return how it moves in an experiment; by default nothing is known."""
         return Motion(self.experiments[experiment].time)
 
+    def offered(self, experiment: int) -> Mapping[str, tuple[str, FloatArray]]:
+        """Return what else an input may be a function of, as measured: unit and values, (n,)."""
+        return {}
+
     def with_experiments(self, experiments: Sequence[Experiment]) -> Machine:
         """Return the machine with the same experiments, of which more is known."""
         other = copy(self)
@@ -180,6 +184,9 @@ class Wrapped(Machine):
 
     def motion(self, experiment: int) -> Motion:
         return self.inner.motion(experiment)
+
+    def offered(self, experiment: int) -> Mapping[str, tuple[str, FloatArray]]:
+        return self.inner.offered(experiment)
 
     def truncated(self) -> Machine:
         return self.around(self.inner.truncated())

@@ -24,6 +24,7 @@ class Quantity:
 
     unit: str
     values: list[FloatArray]
+    period: float = 0.0  # after which all begins anew; 0 for never
 
 
 Quantities = Mapping[str, Quantity]
@@ -45,9 +46,31 @@ class Law:
     spread: float  # standard deviation that the values were thought to have
     # share of what is left of each test that it takes, fitted to the others; None for one test
     withheld: float | None = None
+    orders: tuple[int, ...] = ()  # the waves of a turn that it is a sum of; empty for any function
 
     def __str__(self) -> str:
         return self.by + (f', in proportion to {self.times}' if self.times else '')
+
+    @classmethod
+    def unknown(cls, by: str, at: FloatArray, unit: str) -> Law:
+        """Return a law of a quantity whose values at even places are not known yet."""
+        zeros = (0.0,) * at.size
+        return cls(by, '', 0.0, tuple(at.tolist()), zeros, zeros, unit, '', float(at[1] - at[0]),
+                   0.0)
+
+    @property
+    def shapes(self) -> FloatArray:
+        """Return what its m numbers do at its k places, shape (k, m): hats, or waves of a turn."""
+        if not self.orders:
+            return np.eye(len(self.at))
+        turn = np.outer(np.array(self.at) * 2.0 * math.pi / self.at[-1], self.orders)
+        return np.hstack([np.cos(turn), np.sin(turn)])
+
+    def waves(self) -> list[tuple[int, float]]:
+        """Return its orders with their amplitudes, the greatest first; empty for any function."""
+        numbers = np.linalg.lstsq(self.shapes, np.array(self.values), rcond=None)[0]
+        sizes = np.hypot(*np.split(numbers, 2)).tolist() if self.orders else []
+        return sorted(zip(self.orders, sizes, strict=True), key=lambda wave: -wave[1])
 
     def as_effect(self, place: DisturbanceInput) -> Effect:
         """Return the effect that it is at a place, whose sizes are its values."""
@@ -56,11 +79,15 @@ class Law:
                       (self.as_form(f'{place.component}.law.'),))
 
     def as_form(self, prefix: str = '') -> Form:
-        """Return its values as the sizes of a form."""
+        """Return its numbers as the sizes of a form."""
         most = _FARTHEST * max(self.spread, *map(abs, self.values))
+        names = [f'{wave} {order}' for wave in ('cos', 'sin') for order in self.orders] or [
+            f'at {at:.6g}' for at in self.at]
+        starts = np.linalg.lstsq(self.shapes, np.array(self.values), rcond=None)[0]
         return Form(str(self), tuple(Parameter(
-            f'{prefix}at {at:.6g}', self.unit, -most, most, 0.1 * self.spread, self.spread,
-            start=value) for at, value in zip(self.at, self.values, strict=True)), scanned=True)
+            f'{prefix}{name}', self.unit, -most, most, 0.1 * self.spread, self.spread,
+            start=start) for name, start in zip(names, starts.tolist(), strict=True)),
+            scanned=True)
 
     def in_units(self, size: float, unit: str) -> Law:
         """Return the law of an input, one of which is of a size in a unit."""
@@ -70,12 +97,12 @@ class Law:
                        spread=size * self.spread)
 
     def weights(self, quantities: Quantities) -> list[FloatArray]:
-        """Return what one unit of each of the k values adds over time in each test, (n, k)."""
+        """Return what one unit of each of m numbers adds over time in each test, (n, m)."""
         at = np.array(self.at)
         factors = quantities[self.times].values if self.times else [
             np.ones_like(values) for values in quantities[self.by].values]
         return [factor[:, np.newaxis] * np.maximum(0.0, 1.0 - np.abs(np.clip(
-            values, at.min(), at.max())[:, np.newaxis] - at) / self.width)
+            values, at.min(), at.max())[:, np.newaxis] - at) / self.width) @ self.shapes
             for factor, values in zip(factors, quantities[self.by].values, strict=True)]
 
 

@@ -147,6 +147,10 @@ class OwnMachine(Machine):
                                                                    0.27 * longest)),
                           pulse_s=0.1 * settles, response_s=settles, block_s=settles)
 
+    def offered(self, experiment: int) -> Mapping[str, tuple[str, FloatArray]]:
+        log, stride = self.logs[experiment], self._strides[experiment]
+        return {name: (unit, log[name][::stride]) for name, unit in self.model.along.items()}
+
     def _angles(self, angle: Angle) -> list[FloatArray]:
         """Return an angle in each test at its judged samples [rad]."""
         return [angle(log)[::stride] for log, stride in zip(self.logs, self._strides, strict=True)]
@@ -206,7 +210,7 @@ def _error_of_reading(name: str, unit: str, by: float, experiment: int | None) -
 def _diagram(model: Model) -> Diagram:
     """Return the blocks in the order of the signal, each with a line to the next."""
     found = Diagram.of([*model.blocks, *(effect.component for effect in model.effects),
-                        *(item.component for item in model.push.values())])
+                        *(item.component for item in model.push.values())] or model.readings)
     chain = found.blocks[:len(dict.fromkeys(model.blocks))]
     middle = 0.5 * Diagram.height
     lines = []

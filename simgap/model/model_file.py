@@ -20,7 +20,7 @@ from simgap.model.simulator import Ports, Simulator
 
 _PROGRAMS = ('mujoco', 'fmu')
 _TOP = (*_PROGRAMS, 'step_s', 'inputs', 'starts', 'constants', 'base', 'per_test', 'readings',
-        'effects', 'push', 'settles_s', 'judged_hz', 'blocks', 'advice', 'source')
+        'effects', 'push', 'settles_s', 'judged_hz', 'along', 'blocks', 'advice', 'source')
 # What a number may do, in the order in which it is done. Inputs are delayed; inputs and readings
 # are scaled and added to, as places are.
 _ACTS = ('sets', 'scales', 'adds', 'adds_to_inverse', 'delays')
@@ -109,6 +109,7 @@ def _model(path: Path, top: Mapping[str, Any]) -> Model:
         effects=[_effect(*item) for item in _bodies('effects', top)],
         push={name: _push(key, name, body) for name, (key, body) in pushes.items()},
         settles_s=_optional('settles_s', top), judged_hz=_optional('judged_hz', top),
+        along=_texts('along', top),
         blocks=tuple(_list('blocks', top)), advice=tuple(_list('advice', top)),
         parallel=simulator.parallel)
 

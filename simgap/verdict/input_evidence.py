@@ -17,6 +17,8 @@ from simgap.machine.pulses import root
 
 # Variances of the input over that of the noise that are tried.
 _RATIOS = np.logspace(-4.0, 4.0, 25)
+# Waves of a turn that an input may be a sum of.
+_MOST_WAVES = 24
 # Lags by which a reading may predict itself, whatever it is that repeats.
 _LAGS = 20
 _FIRST = np.eye(1, _LAGS)[0]
@@ -111,6 +113,26 @@ class InputEvidence:
             vectors @ (turned / stiff[:, best]) / size,
             np.sqrt(noise * (vectors ** 2 @ (1.0 / stiff[:, best])) / size),
             math.sqrt(noise * _RATIOS[best] / size))
+
+    def orders(self, square: FloatArray, slope: FloatArray) -> list[int]:
+        """Return which waves pay for their two numbers, one after the other, the best first."""
+        # of m waves these are the normal equations of the cosines and then of the sines
+        kept: list[int] = []
+        count, left = len(slope) // 2, self.energy
+        price = math.log(max(self._count, 2.0)) + math.log(count)
+        while len(kept) < _MOST_WAVES:
+            gains = np.zeros(count)
+            for wave in set(range(count)) - set(kept):
+                both = [*kept, wave, *(item + count for item in (*kept, wave))]
+                gains[wave] = slope[both] @ np.linalg.lstsq(
+                    square[np.ix_(both, both)], slope[both], rcond=None)[0]
+            best = int(np.argmax(gains))
+            after = max(self.energy - float(gains[best]), 1e-9 * self.energy)
+            if 0.5 * self._count * math.log(left / after) < price:
+                break
+            kept.append(best)
+            left = after
+        return kept
 
     def net(self, evidence: float) -> float:
         """Return the share of the energy whose loss alone would be worth this evidence."""

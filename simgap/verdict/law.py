@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -14,6 +14,8 @@ from simgap.verdict.input_evidence import InputEvidence
 
 # A function has its values at so many places of the range, with straight lines between.
 _PLACES = 12
+# The same of a turn: four for each wave of the greatest order.
+_FINEST, _TURN = 800, 2.0 * np.pi
 # Places that are hardly reached have no value: their share of the greatest hat.
 REACHED = 0.05
 # What an input may be in proportion to.
@@ -39,6 +41,11 @@ def quantities_of(machine: Machine, readings: Sequence[FloatArray]) -> Quantitie
             experiment.channels, experiment.units, predicted, strict=True)}
         for name, (unit, own) in seen.items():
             found.setdefault(name, Quantity(unit, [])).values.append(np.asarray(own))
+        for name, (unit, own) in machine.offered(k).items():
+            found.setdefault(name, Quantity(unit, [])).values.append(own)
+            if unit == 'rad':
+                found.setdefault(f'{name} within a turn', Quantity(
+                    unit, [], _TURN)).values.append(np.mod(own, _TURN))
     return {name: item for name, item in found.items()
             if len(item.values) == len(machine.experiments)}
 
@@ -56,9 +63,11 @@ def likeliest(evidence: InputEvidence, square: FloatArray, slope: FloatArray,
     for times, factor in factors.items():
         weight = np.concatenate(factor.values)[:, np.newaxis] if times else 1.0
         for by, quantity in quantities.items():
-            if by == times or np.ptp(np.concatenate(quantity.values)) == 0.0:
+            if by == times or quantity.period or np.ptp(np.concatenate(quantity.values)) == 0.0:
                 continue
-            at, columns = _hats(np.concatenate(quantity.values))
+            values = np.concatenate(quantity.values)
+            at = np.linspace(values.min(), values.max(), _PLACES)
+            columns = _hats(values, at)
             reached = np.abs(weight * columns).max(axis=0)
             kept = reached > REACHED * reached.max()
             columns = (weight * columns)[:, kept]
@@ -73,7 +82,39 @@ def likeliest(evidence: InputEvidence, square: FloatArray, slope: FloatArray,
     return best
 
 
-def _hats(values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return places over a range, and at values, shape (n,), the hats about them, (n, places)."""
-    at, step = np.linspace(values.min(), values.max(), _PLACES, retstep=True)
-    return at, np.maximum(0.0, 1.0 - np.abs(values[:, np.newaxis] - at) / step)
+def within_a_turn(evidence: InputEvidence, quantities: Quantities,
+                  moved: Callable[[Sequence[FloatArray]], Sequence[FloatArray]]) -> Law | None:
+    """
+    Return the likeliest law of an angle within a turn, a sum of waves; None if none helps.
+
+    It may be finer than pulses in time. `moved` returns what residuals gain by courses of each
+    test, shape (n, m), of shape (n c, m).
+    """
+    best = None
+    for by, quantity in quantities.items():
+        if not quantity.period:
+            continue
+        law = Law.unknown(by, np.linspace(0.0, quantity.period, _FINEST + 1), quantity.unit)
+        weights = law.weights(quantities)
+        square, slope = evidence.reduced(moved(weights))
+        every = replace(law, orders=tuple(range(1, _FINEST // 4)))
+        waves = np.tile(every.shapes, (len(weights), 1))
+        square, slope = waves.T @ square @ waves, waves.T @ slope
+        found = evidence.orders(square, slope)
+        law = replace(law, orders=tuple(order + 1 for order in found))
+        kept = [*found, *(order + len(every.orders) for order in found)]
+        own = square[np.ix_(kept, kept)]
+        if not kept or (weighed := evidence.weighed(
+                own, slope[kept], float(np.trace(own)) / len(own))).evidence <= (
+                    best.evidence if best else 0.0):
+            continue
+        values, deviations = law.shapes @ weighed.factors, np.sqrt(
+            law.shapes ** 2 @ weighed.deviations ** 2)
+        best = replace(law, evidence=weighed.evidence, values=tuple(values.tolist()),
+                       deviations=tuple(deviations.tolist()), spread=weighed.spread)
+    return best
+
+
+def _hats(values: FloatArray, at: FloatArray) -> FloatArray:
+    """Return hats about k places at even distances, at n values, shape (n, k)."""
+    return np.maximum(0.0, 1.0 - np.abs(values[:, np.newaxis] - at) / (at[1] - at[0]))

@@ -102,10 +102,11 @@ def _added(problem: LeastSquares, base: Hypothesis, place: Place,
 def _as_fitted(law: Law, found: Hypothesis, reached: FloatArray, gained: float,
                withheld: float | None, settings: IntervalSettings) -> Law:
     """Return a law as it was fitted, where the motion that it makes has reached it."""
-    state = found.state
-    spread = np.sqrt(np.diag(covariance(state, 1.0, settings)))
-    there = reached > REACHED * reached.max()
-    own = np.flatnonzero([p in found.forms[-1].parameters for p in state.parameters])[there]
+    state, shapes = found.state, law.shapes
+    own = np.flatnonzero([p in found.forms[-1].parameters for p in state.parameters])
+    known = covariance(state, 1.0, settings)[np.ix_(own, own)]
+    values, spread = shapes @ state.x[own], np.sqrt(np.sum((shapes @ known) * shapes, axis=1))
+    there = np.ones(len(values), bool) if law.orders else reached > REACHED * reached.max()
     return replace(law, evidence=gained, at=tuple(np.array(law.at)[there].tolist()),
-                   values=tuple(state.x[own].tolist()),
-                   deviations=tuple(spread[own].tolist()), withheld=withheld)
+                   values=tuple(values[there].tolist()),
+                   deviations=tuple(spread[there].tolist()), withheld=withheld)

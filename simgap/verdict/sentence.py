@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 # A machine without words of its own has so many numbers of an effect listed.
 _LISTED = 4
+# The greatest waves of a law are said.
+_WAVES = 5
 
 
 class Said(NamedTuple):
@@ -190,11 +192,15 @@ def _law(law: Law) -> str:
     least, most = (choose(range(len(law.values)), key=lambda j: law.values[j])
                    for choose in (min, max))
     low, high = sorted((least, most))
-    form, lacks = nearest_form(law)
     text = (f'It goes from {quantity(law.values[low], law.unit)} at '
             f'{quantity(law.at[low], law.by_unit)} to {quantity(law.values[high], law.unit)} at '
-            f'{quantity(law.at[high], law.by_unit)}, most like {form}, which lacks '
-            f'{percent(lacks)} of it')
+            f'{quantity(law.at[high], law.by_unit)}, ')
+    if law.orders:
+        text += 'a sum of waves a turn: ' + ', '.join(
+            f'{order} with {quantity(size, law.unit)}' for order, size in law.waves()[:_WAVES])
+    else:
+        form, lacks = nearest_form(law)
+        text += f'most like {form}, which lacks {percent(lacks)} of it'
     if law.withheld is None:
         return f'{text}.'
     if law.withheld <= 0.0:

@@ -143,6 +143,21 @@ def test_a_log_that_was_not_used_is_predicted_to_the_noise_with_the_effect_only(
     assert error.configured > error.before
 
 
+def test_what_repeats_itself_each_turn_is_a_law_of_waves_and_predicts_a_log() -> None:
+    """Two orders of an angle that turns, one of them too fast for a pulse; noise is 1 mrad."""
+    waves = {'wave_cosine': 0.01, 'wave_order': 23.0}
+    found = diagnose_logs(swing(along={'turn': 'rad'}), logs(waves), without=['sensor.wave'])
+    assert found.word == 'unknown_effect' and found.lawful is not None
+    law = found.may_enter_at[0].law
+    assert law is not None and (law.by, law.orders) == ('turn within a turn', (23,))
+    # as what enters through a lag of 0.1 s, 16.1 rad/s of which the angle has less
+    assert found.may_enter_at[0].name == 'wind on the swing'
+    assert law.waves()[0][1] == pytest.approx(0.01 * np.hypot(1.0, 0.7 * 23.0 * 0.1), rel=0.05)
+    assert '23 with' in found.summary()
+    error = unseen(found, log_of('new', 0.7, 5, waves))['angle']
+    assert error.after > 0.006 and error.lawful == pytest.approx(NOISE, rel=0.3)
+
+
 def test_the_page_shows_the_models_own_parts_and_no_other_machine() -> None:
     page = render('verdict.html', **contents(diagnose_logs(
         swing(blocks=('swing', 'sensor')), logs({'drift': 0.01}))))
