@@ -14,7 +14,6 @@ that test_signal plays and `diagnose` reads:
 
 If one answer is left or sure, or something without a name is likelier than each answer, the test
 looks for other effects, as with --objective detect.
---objective sharpen asks for the test that makes the numbers of the likeliest answer most certain.
 --objective detect needs no verdict: it asks for the first test, for the effects of --suspect or
 for the whole catalogue. limits.yaml may hold rate_deg_s, acceleration_deg_s2, travel_deg,
 current_A, voltage_V, axis_torque_N_m, hot_current_A and hot_s; what it lacks follows from the

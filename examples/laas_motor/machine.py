@@ -54,7 +54,8 @@ def from_speed(numbers: Numbers, test: OneTest) -> dict[str, Array]:
 
 def even(log: Log) -> Log:
     """Return a log at the controller's ticks: its stamps are those of a computer."""
-    return Log(log.name, np.arange(log.time.size, dtype=np.float64) * TICK, log.columns, labels=log.labels)
+    ticks = np.arange(log.time.size, dtype=np.float64)
+    return Log(log.name, TICK * ticks, log.columns, labels=log.labels)
 
 
 motor = machine(

@@ -10,8 +10,7 @@ tests that the model declares are searched for the one that settles most, within
   simgap propose verdict.json --model my_machine.py --out next.csv --report next.html
 
 If one answer is left or sure, or something without a name is likelier than each answer, the test
-looks for other effects, as with --objective detect. --objective sharpen asks for the test that
-makes the numbers of the likeliest answer most certain. --objective detect needs no verdict.
+looks for other effects, as with --objective detect. --objective detect needs no verdict.
 
 The exit code is 1 if no test within the limits helps.
 """
@@ -42,9 +41,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def add_proposal_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('verdict', nargs='?', type=Path, metavar='VERDICT',
                         help='JSON of a diagnosis; not needed with --objective detect')
-    parser.add_argument('--objective', choices=('separate', 'sharpen', 'detect'),
-                        help='tell the answers apart, make numbers more certain, or find effects '
-                             'at all (default: separate, or detect if no answers are open)')
+    parser.add_argument('--objective', choices=('separate', 'detect'),
+                        help='tell the answers apart, or find effects at all (default: separate, '
+                             'or detect if no answers are open)')
     parser.add_argument('--suspect', nargs='+', default=[], metavar='EFFECT',
                         help='effects that --objective detect looks for (default: all)')
     parser.add_argument('--duration', type=float, default=30.0, metavar='S',

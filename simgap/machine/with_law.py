@@ -56,7 +56,7 @@ class Law:
         """Return a law of a quantity whose values at even places are not known yet."""
         zeros = (0.0,) * at.size
         return cls(by, '', 0.0, tuple(at.tolist()), zeros, zeros, unit, '', float(at[1] - at[0]),
-                   0.0)
+                   1.0)
 
     @property
     def shapes(self) -> FloatArray:

@@ -21,8 +21,8 @@ from simgap.verdict.spoken import quantity
 # simulation is smooth.
 _ROUGH = 0.5
 _LEAST_SAMPLES = 50
-# Simulations of all tests in a usual diagnosis, for each number that it may fit: 11 to 55, measured
-# on joints and axes (lab/notebook/performance.md).
+# Simulations of all tests in a usual diagnosis, for each number that it may fit: 11 to 55 on
+# joints and axes (lab/notebook/performance.md).
 _RUNS_OF_A_NUMBER = 50
 
 

@@ -22,8 +22,6 @@ class Candidate:
     # smallest sizes that show over those in the best test, geometric mean; NaN if unknown
     coarseness: float = math.nan
     separation: Separation | None = None  # how well it tells the rivals apart
-    # standard deviation before and after, by number
-    deviations: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     # smallest size that shows and its unit, by effect
     sizes: Mapping[str, tuple[float, str]] = field(default_factory=dict)
 

@@ -17,17 +17,15 @@ from simgap.machine.process import with_process
 from simgap.next_test.candidate import Candidate, Proposal
 from simgap.next_test.confusability import confusability
 from simgap.next_test.rivals import Findings, known_to
-from simgap.next_test.separation import separation, sharpening
+from simgap.next_test.separation import separation
 from simgap.next_test.space import TestSpace
 from simgap.settings import DEFAULT
 
-SEPARATE, SHARPEN, DETECT = 'separate', 'sharpen', 'detect'
+SEPARATE, DETECT = 'separate', 'detect'
 CRITERIA: Mapping[str, str] = {
     SEPARATE: 'T-optimality with prior probabilities: expected information between the rivals, '
               'all tolerances free; weighted by how likely none of them is true, the rule of '
               'detect (compound design)',
-    SHARPEN: "D_s-optimality: determinant of the covariance of the likeliest rival's effects, all "
-             'tolerances free',
     DETECT: 'smallest size of each effect that shows beside all tolerances, in the tests so far '
             'or in this one, over that with the best test that was tried, in the geometric mean'}
 # Less information than this does not count [nat].
@@ -119,10 +117,6 @@ class TestDesign:
     def _judged(self, test: Candidate) -> Candidate:
         """Judge a test with all tolerances free."""
         machine = with_process(self._planned(test))
-        if self._objective == SHARPEN:
-            score, found = sharpening(
-                machine, max(self._rivals, key=lambda rival: rival.probability), self._inflated)
-            return replace(test, score=score, deviations=found)
         test = replace(test, sizes=self._sizes(machine))
         return test if self._objective == DETECT else replace(
             test, separation=separation(machine, self._rivals, self._inflated))
@@ -186,8 +180,6 @@ def _helps(test: Candidate) -> bool:
     least = DEFAULT.planning.least_information
     if test.separation is not None:
         return test.separation.information() >= least
-    if test.deviations:
-        return any(after < (1.0 - least) * before for before, after in test.deviations.values())
     return any(math.isfinite(size) for size, _ in test.sizes.values())
 
 

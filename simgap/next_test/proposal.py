@@ -53,9 +53,6 @@ def as_data(proposal: Proposal, space: TestSpace) -> dict[str, Any]:
 
 def _told(test: Candidate, rivals: Sequence[Rival]) -> dict[str, Any]:
     found: dict[str, Any] = {'score': test.score}
-    if test.deviations:
-        found['deviations'] = {name: {'before': before, 'after': after}
-                               for name, (before, after) in test.deviations.items()}
     if (told := test.separation) is not None:
         sure, after = DEFAULT.planning.sure, told.posterior()
         found['expected'] = {
@@ -100,8 +97,7 @@ def _why_none(data: Mapping[str, Any]) -> str:
         return (f'  the limit that costs most is {best["limit"]}: a test '
                 f'({best["family"]}) that uses {100.0 * best["share"]:.0f} % of it would')
     if data['objective'] == SEPARATE and len(data['rivals']) < 2:
-        return ('  there is one answer only, and nothing to tell apart; --objective sharpen '
-                'makes its numbers more certain')
+        return '  there is one answer only, and nothing to tell apart'
     return '  nor does one beyond them, of those that were tried'
 
 
@@ -123,8 +119,6 @@ def _promises(data: Mapping[str, Any]) -> list[str]:
         found.append('  what has no name yet may lie in ' + ', '.join(
             f'{part} ({100.0 * share:.0f} %)' for part, share in parts)
             + '; effects there count most')
-    found += [f'  {name}: standard deviation {item["before"]:.3g} now, {item["after"]:.3g} after'
-              for name, item in list(data.get('deviations', {}).items())[:_SIZES]]
     sizes = sorted(data.get('smallest_sizes', {}).items())
     found += [f'  {name}: shows from ' + (
         'no size on' if item['size'] is None else f'{item["size"]:.3g} {item["unit"]}')

@@ -10,7 +10,7 @@ import numpy as np
 from scipy import linalg
 from simgap.fit.box_qp import box_constrained_step
 from simgap.fit.broyden import Jacobian
-from simgap.fit.cholesky import factored, ROUNDING, solved
+from simgap.fit.cholesky import ROUNDING
 from simgap.fit.least_squares import LeastSquares
 from simgap.fit.noise import with_model_error
 from simgap.fit.state import proper_precision
@@ -80,28 +80,6 @@ def separation(machine: Machine, rivals: Sequence[Rival], inflated: float,
     lack = np.maximum(lack - np.diag(lack)[:, np.newaxis], 0.0)
     parts = power / max(float(power.sum()), _LEAST)
     return Separation(prior, lack, dict(zip(channels, parts.tolist(), strict=True)), ends)
-
-
-def sharpening(machine: Machine, rival: Rival,
-               inflated: float) -> tuple[float, dict[str, tuple[float, float]]]:
-    """
-    Return how well planned tests determine a rival's effects, or all its numbers if it has none.
-
-    That is the fall of the logarithm of a deviation, summed over all directions, and the standard
-    deviations before and after the tests, by number.
-    """
-    fit = _Fit(_planned(machine, known_to(machine, rival)), rival, inflated)
-    own = {p.name for form in rival.forms_of(machine) for p in form.parameters}
-    wanted = [j for j in fit.known if fit.numbers[j].name in own] or fit.known
-    names = [fit.numbers[j].name for j in wanted]
-    hessian = fit.first[1]
-    unit = np.sqrt(np.outer(np.diag(hessian), np.diag(hessian)))
-    inverse = solved(factored(hessian / unit, ROUNDING), np.eye(len(unit))) / unit
-    both = rival.covariance_of(names), inflated * inverse[np.ix_(wanted, wanted)]
-    before, after = (np.linalg.slogdet(covariance)[1] for covariance in both)
-    deviations = (np.sqrt(np.maximum(np.diag(covariance), 0.0)).tolist() for covariance in both)
-    return 0.5 * float(before - after), {
-        name: (one, other) for name, one, other in zip(names, *deviations, strict=True)}
 
 
 def _planned(machine: Machine, point: Point) -> LeastSquares:

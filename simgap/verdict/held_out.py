@@ -15,7 +15,8 @@ from simgap.verdict.judge import Judge, Withheld
 _TURNS = ('each recording in turn, with the effect as the others have it; offsets within the '
           'tolerance were fitted to it, with the effect and without')
 _NO_GAP = 'each recording alone shows no gap: offsets within the tolerance account for it'
-_HALVES = 'the second half of the recording, predicted from the first'
+_HALVES = ('the second half of the recording, with the effect as the first has it; offsets '
+           'within the tolerance were fitted to it, with the effect and without')
 _INTERVAL = ("a bootstrap over blocks of time, each with a draw of the effect's numbers from "
              'their Gaussian posterior in the training data')
 BOUNDS = (-1.0, 1.0)
@@ -27,8 +28,7 @@ def held_out(problem: LeastSquares, none: Hypothesis, best: Hypothesis, threads:
     single = len(problem.experiments) == 1
     judge = Judge(problem, none, best, groups or [e.name for e in problem.experiments])
     with ThreadPoolExecutor(threads) as pool:
-        folds = list(pool.map(judge.second_half if single else judge.withheld,
-                              range(len(problem.experiments))))
+        folds = list(pool.map(judge.withheld, range(len(problem.experiments))))
     counted = [fold for fold in folds if fold.after is not None] or folds
     known = counted[0].after is not None
     before = [fold.before for fold in counted]

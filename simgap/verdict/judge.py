@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Judge effects on a withheld test, to which offsets within the tolerance are fitted."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 import math
 from statistics import fmean
@@ -125,15 +125,15 @@ class Judge:
 
     def withheld(self, k: int) -> Withheld:
         """Judge on test k what the other tests have taught."""
-        machine, groups = self._problem.machine, self._groups
-        testing = Part(machine, [k])
+        testing, part = self._parts(k)
         bare = self._fitted(testing, self._none.state.parameters, self._none.state.point(),
                             self._none)
         problem = LeastSquares(testing, settings=self._settings)
-        fold = self._fold(k, _gap(testing, bare.point()), problem.residuals_of(bare, 0))
+        [test] = testing.experiments
+        fold = Withheld(test.name, test.time, _gap(testing, bare.point()),
+                        problem.residuals_of(bare, 0))
         if not self._best.effects:
             return fold
-        part = Part(machine, [i for i, group in enumerate(groups) if group != groups[k]])
         training, unaided, found = self._trained(part)
         reasons, posterior = self._undetermined(training, unaided, found)
         reasons = {**reasons, **self._unseen_labels(testing, part)}
@@ -154,37 +154,21 @@ class Judge:
         point = {**held, **state.point()}
         fold = replace(fold, reasons={**reasons, **self._unseen(problem, point, state.residual,
                                                                 reasons)})
-        known = np.linalg.pinv(state.hessian + np.diag(prior_precision(state.parameters)))
+        return self._completed(fold, problem, point, state, found, posterior)
 
-        def followed(drawn: FloatArray) -> FloatArray:
-            # what a draw leaves once the offsets have followed it
-            changes = (drawn - state.residual).T.astype(np.float32)
-            steps = known @ weighted_product(state.jacobian, state.weight, changes)
-            return drawn - (state.jacobian @ steps.astype(np.float32)).T
-
-        return self._completed(fold, problem, point, state.residual, found, posterior, followed)
-
-    def second_half(self, k: int) -> Withheld:
-        """Judge on the second half of a test what the first half has taught."""
-        machine, whole = self._problem.machine, self._problem.experiments[k]
+    def _parts(self, k: int) -> tuple[Part, Part]:
+        """Return test k and all of other groups; of a single test its second and first half."""
+        machine, groups = self._problem.machine, self._groups
+        if len(machine.experiments) > 1:
+            return Part(machine, [k]), Part(machine, [
+                i for i, group in enumerate(groups) if group != groups[k]])
+        whole = machine.experiments[k]
         middle = 0.5 * (whole.time[0] + whole.time[-1])  # a window may begin later than its run
         first = (whole.time < middle)[:, np.newaxis]
-        part, testing = (
+        testing, training = (
             Part(machine, [k], [replace(whole, measured=np.where(used, whole.measured, np.nan))])
-            for used in (first, ~first))
-        problem, unaided, found = self._trained(part)
-        own = LeastSquares(testing, settings=self._settings)
-        fold = self._fold(k, _gap(testing, unaided.point()),
-                          _shaped(own, own.residuals(unaided.point())))
-        if not self._best.effects:
-            return fold
-        reasons, posterior = self._undetermined(problem, unaided, found)
-        left_out = {p.name for effect, form in self._best.items
-                    if effect in reasons for p in form.sizes}
-        point = {**found.point(), **dict.fromkeys(left_out, 0.0)}
-        residual = own.residuals(point)
-        fold = replace(fold, reasons={**reasons, **self._unseen(own, point, residual, reasons)})
-        return self._completed(fold, own, point, residual, found, posterior)
+            for used in (~first, first))
+        return testing, training
 
     def _unseen(self, problem: LeastSquares, point: dict[str, float], residual: FloatArray,
                 reasons: Mapping[str, str]) -> dict[str, str]:
@@ -204,17 +188,11 @@ class Judge:
         return [p for effect, form in self._best.items
                 if effect not in reasons for p in form.parameters]
 
-    def _fold(self, k: int, gap: FloatArray, before: FloatArray) -> Withheld:
-        experiment = self._problem.experiments[k]
-        return Withheld(experiment.name, experiment.time, gap, before)
-
     def _completed(self, fold: Withheld, problem: LeastSquares, point: Mapping[str, float],
-                   residual: FloatArray, found: FitState, posterior: FloatArray,
-                   followed: Callable[[FloatArray], FloatArray] = lambda drawn: drawn) -> Withheld:
+                   state: FitState, found: FitState, posterior: FloatArray) -> Withheld:
         """Return a fold with what remains, and with draws of the numbers that can be judged."""
-        # `point` and `residual`, shape (n c,), are where the withheld test is judged; `found` and
-        # `posterior` are the fit to the training data and its covariance. `followed` returns, of
-        # residuals with draws, shape (draws, n c), those left once the nuisances have followed.
+        # `state` is a fit of the nuisances to the withheld test, at `point`; `found` and
+        # `posterior` are the fit to the training data and its covariance
         numbers = self._numbers(fold.reasons)
         if not numbers:
             return fold
@@ -224,14 +202,19 @@ class Judge:
         draws = np.random.default_rng(0).multivariate_normal(
             found.x[places], posterior[np.ix_(places, places)], self._settings.held_out.draws,
             method='eigh', check_valid='ignore')
-        drawn = followed(problem.residuals_at([
+        drawn = problem.residuals_at([
             {**point, **{p.name: min(max(value, p.low), p.high)
                          for p, value in zip(numbers, draw, strict=True)}}
-            for draw in draws.tolist()]))
+            for draw in draws.tolist()])
+        # what a draw leaves once the offsets have followed it
+        known = np.linalg.pinv(state.hessian + np.diag(prior_precision(state.parameters)))
+        changes = (drawn - state.residual).T.astype(np.float32)
+        steps = known @ weighted_product(state.jacobian, state.weight, changes)
+        drawn = drawn - (state.jacobian @ steps.astype(np.float32)).T
         return replace(
             fold, judged=tuple(e for e in self._best.effects if e not in fold.reasons),
             gap_after=_gap(problem.machine, point),
-            after=_shaped(problem, residual),
+            after=_shaped(problem, state.residual),
             names=tuple(p.name for p in numbers), values=found.x[places],
             drawn=np.array([_shaped(problem, z) for z in drawn]))
 

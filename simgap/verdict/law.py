@@ -4,12 +4,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from simgap.machine.contract import FloatArray, Machine
-from simgap.machine.with_law import Law, Quantities, Quantity
+from simgap.fit.least_squares import LeastSquares
+from simgap.machine.contract import DisturbanceInput, FloatArray, Machine
+from simgap.machine.with_law import Law, Quantities, Quantity, WithLaw
 from simgap.verdict.input_evidence import InputEvidence
 
 # A function has its values at so many places of the range, with straight lines between.
@@ -82,21 +83,24 @@ def likeliest(evidence: InputEvidence, square: FloatArray, slope: FloatArray,
     return best
 
 
-def within_a_turn(evidence: InputEvidence, quantities: Quantities,
-                  moved: Callable[[Sequence[FloatArray]], Sequence[FloatArray]]) -> Law | None:
+def within_a_turn(evidence: InputEvidence, problem: LeastSquares, point: Mapping[str, float],
+                  place: DisturbanceInput, quantities: Quantities) -> Law | None:
     """
     Return the likeliest law of an angle within a turn, a sum of waves; None if none helps.
 
-    It may be finer than pulses in time. `moved` returns what residuals gain by courses of each
-    test, shape (n, m), of shape (n c, m).
+    It may be finer than pulses in time, because each part of a turn is moved in the simulation.
     """
     best = None
     for by, quantity in quantities.items():
         if not quantity.period:
             continue
         law = Law.unknown(by, np.linspace(0.0, quantity.period, _FINEST + 1), quantity.unit)
-        weights = law.weights(quantities)
-        square, slope = evidence.reduced(moved(weights))
+        weights, effect = law.weights(quantities), law.as_effect(place)
+        columns = LeastSquares(
+            WithLaw(problem.machine, effect, place, weights), settings=problem.settings).jacobian(
+            dict(point), effect.forms[0].parameters, evidence.residual, central=False)
+        square, slope = evidence.reduced([
+            columns[problem.rows(k)].astype(float) for k in range(len(weights))])
         every = replace(law, orders=tuple(range(1, _FINEST // 4)))
         waves = np.tile(every.shapes, (len(weights), 1))
         square, slope = waves.T @ square @ waves, waves.T @ slope

@@ -82,12 +82,6 @@ class Verdict:
                 lines.append(f'  {100.0 * answer.probability:5.1f} %  '
                              + ' and '.join(answer.effects))
                 lines += [f'           {line}' for line in value_lines(answer.parameters)]
-        for group in self.confusable:
-            lines.append('  these data cannot tell apart: ' + ', '.join(group))
-        if self.may_enter_at:
-            place = self.may_enter_at[0]
-            lines.append(f'  what is not named most likely enters as {place.name}, which could '
-                         f'explain {100.0 * place.explained:.0f} % of the gap')
         lines += [f'  {line}' for line in _closed(self)]
         lines += [f'  {line}' for line in (*lines_of_labels(self.labels or ()),
                                            *lines_of_days(self.reproducibility))]

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 from simgap.fit.least_squares import LeastSquares
@@ -55,10 +54,9 @@ def places(problem: LeastSquares, point: Mapping[str, float],
                 np.interp(moments, e.time, own) for moments, e, own in zip(
                     peaks, problem.experiments, quantity.values, strict=True)])
             for name, quantity in quantities.items()}) if plain and for_laws else None
-        if plain and for_laws and any(item.period for item in quantities.values()):
-            law = max((item for item in (law, within_a_turn(
-                for_laws, quantities, partial(_moved, plain, point, place))) if item),
-                key=lambda item: item.evidence, default=None)
+        if plain and for_laws:
+            fine = within_a_turn(for_laws, plain, point, place, quantities)
+            law = max(filter(None, (law, fine)), key=lambda item: item.evidence, default=None)
         found.append((share, Place(place.name, place.component, weighed, evidence.net(weighed),
                                    law.in_units(place.size, place.unit) if law else None)))
 
@@ -105,30 +103,6 @@ def _columns(problem: LeastSquares, point: Mapping[str, float],
     return ([own.summed(np.eye(own.times.size), e.time.size)
              for own, e in zip(found, problem.experiments, strict=True)],
             [own.times for own in found])
-
-
-def _moved(problem: LeastSquares, point: Mapping[str, float], place: DisturbanceInput,
-           weights: Sequence[FloatArray]) -> list[FloatArray]:
-    """Return what residuals gain by courses of an input, shape (n, m), in each test, (n c, m)."""
-    machine, experiments = problem.machine, problem.experiments
-    if place in machine.disturbance_inputs:
-        still = predicted(machine, point)
-        rows = [machine.simulate_disturbed(dict(point), place, [
-            partial(_between, e.time, own[:, j])
-            for e, own in zip(experiments, weights, strict=True)])
-            for j in range(weights[0].shape[1])]
-        moved = [np.stack([np.nan_to_num(row[k] - still[k]) for row in rows], axis=-1)
-                 for k in range(len(experiments))]
-    else:
-        moved = [np.zeros((*e.measured.shape, own.shape[1])) for e, own in zip(
-            experiments, weights, strict=True)]
-        for item, own in zip(moved, weights, strict=True):
-            item[:, experiments[0].channels.index(place.component)] = place.size * own
-    return _seen(problem, moved)
-
-
-def _between(times: FloatArray, values: FloatArray, time: FloatArray) -> FloatArray:
-    return np.asarray(np.interp(time, times, values))
 
 
 def _seen(problem: LeastSquares, responses: Sequence[FloatArray]) -> list[FloatArray]:

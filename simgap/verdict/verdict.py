@@ -118,9 +118,6 @@ def which(decision: Decision, settings: VerdictSettings,
                             'parameters': {name: value for name, value in values(
                                 answer.hypothesis).items()
                                 if name in answer.hypothesis.parameters_of(answer.effects)}})
-    if ['none'] not in [entry['effects'] for entry in entries]:
-        share = next(a.probability for a in decision.answers if not a.effects)
-        entries.append({'effects': ['none'], 'probability': share, 'parameters': {}})
     entries.append({'effects': ['unknown'], 'probability': decision.unknown, 'parameters': {}})
     total = sum(entry['probability'] for entry in entries)
     for entry in entries:

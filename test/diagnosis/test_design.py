@@ -173,19 +173,6 @@ def test_with_a_single_answer_there_is_nothing_to_tell_apart() -> None:
     assert 'nothing to tell apart' in lines(as_data(found, Loads(1.6)))[1]
 
 
-def test_a_sharpening_test_has_the_deviation_of_the_closed_form() -> None:
-    found = TestDesign(Loads(1.6), Findings([rival('compliance', 0.2, 0.95)]), 'sharpen',
-                       effort=SMALL).run()
-    best = found.tests[0]
-    # y = (1 + c) load sin: the information is load^2 n / 2 / sigma^2, and the prior's; the zero is
-    # orthogonal to the sine but for the last sample
-    swing = best.test * np.sin(2.0 * np.pi * np.linspace(0.0, 1.0, 60))
-    expected = (1.0 / 0.01 + float(swing @ swing) / 0.03 ** 2) ** -0.5
-    before, after = best.deviations['lever.compliance']
-    assert before == pytest.approx(0.1)
-    assert after == pytest.approx(expected, rel=1e-3)
-
-
 def test_a_suspicion_is_looked_for_alone() -> None:
     found = TestDesign(Loads(1.6), objective='detect', suspected=['lever.hardening'],
                        effort=SMALL).run()

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""A real motor that cogs, with a feed-forward that was on for a part: LAAS, lab/notebook/laas.md."""
+"""A real motor that cogs, with a current against it for a while: lab/notebook/laas.md."""
 
 from __future__ import annotations
 
@@ -49,6 +49,6 @@ def test_the_torque_by_angle_predicts_the_speed_of_another_log() -> None:
     law = found.may_enter_at[0].law
     assert law is not None and found.may_enter_at[0].name == 'torque on the rotor'
     order, size = law.waves()[0]
-    assert order == 72 and size == pytest.approx(0.188, rel=0.15)
+    assert order == 72 and 0.15 < size < 0.25
     speed = unseen(found, part('b', 0))['speed']
     assert speed.lawful is not None and speed.after ** 2 > 9.0 and speed.lawful ** 2 < 2.5
