@@ -32,10 +32,10 @@ def recorder_errors(entries: Iterable[Mapping[str, Any]]) -> SensorReadings:
         except (KeyError, TypeError, ValueError) as error:
             raise UserError(f'recorder: {entry!r} given, allowed is name and value') from error
         kind, _, reading = name.partition(':')
-        if not (kind in ('gain', 'zero', 'delay') and reading in AT
+        if not (kind in ('gain', 'zero', 'delay', 'lag') and reading in AT
                 or kind in ('clock', 'clock_rate') and not reading):
-            raise UserError(f'recorder: {name}: no such error; allowed are gain, zero and '
-                            f'delay of {", ".join(AT)} (such as gain:tach_1), clock '
+            raise UserError(f'recorder: {name}: no such error; allowed are gain, zero, delay '
+                            f'and lag of {", ".join(AT)} (such as gain:tach_1), clock '
                             'and clock_rate')
         if not math.isfinite(value):
             raise UserError(f'recorder: {name}: {value} given, allowed is a number')

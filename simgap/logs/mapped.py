@@ -74,6 +74,9 @@ def _one_file(path: Path, import_map: ImportMap, constants: Mapping[str, float])
         clocks = {samples.clock: _Clock(path, samples.clock, table, import_map)
                   for samples in signals}
         _check_lengths(table, signals)
+        beginning: dict[int, list[_Samples]] = {}
+        for samples in signals:
+            beginning.setdefault(samples.places[1], []).append(samples)
         conditions = [(*table.place(column), value) for column, value in import_map.where.items()]
         for line, row in table.rows:
             if conditions and not all(_holds(row[place], k, value)
@@ -82,9 +85,13 @@ def _one_file(path: Path, import_map: ImportMap, constants: Mapping[str, float])
             room -= len(signals)
             if room < 0:
                 raise RecordingError(f'{path}: {table.counted} {line}: {SAMPLES.exceeded()}')
-            stamps = {column: clock.read(line, row) for column, clock in clocks.items()}
-            for samples in signals:
-                samples.read(line, row, stamps)
+            # a message fills few of the columns of a bag
+            stamps = {column: clock.read(line, row) for column, clock in clocks.items()
+                      if row[clock.place] != ''}
+            for place, own in beginning.items():
+                if row[place] != '':
+                    for samples in own:
+                        samples.read(line, row, stamps)
     dropped = sum(clock.repeated for clock in clocks.values())
     if dropped and import_map.time.duplicates != 'refuse':
         warnings.warn(f'{path}: {dropped} time stamps are repeated; the '
@@ -167,7 +174,7 @@ class _Samples:
             numbers.append(_number_of(text, cell, self._decimal, signal.sign_bit))
         value = math.nan if signal.number.whole else self._value(line, numbers)
         cell = Cell(self._path, line, self.name, self._counted)
-        stamp = stamps[self.clock]
+        stamp = stamps.get(self.clock)
         if stamp is None:
             raise cell.refuse('there is a value, but no time stamp')
         stamp += signal.clock_offset_ns
@@ -257,7 +264,7 @@ class _Clock:
 
     def __init__(self, path: Path, column: str | int, table: Table, import_map: ImportMap) -> None:
         self.repeated = 0
-        self._place, index = table.place(column)
+        self.place, index = table.place(column)
         self._time, self._decimal = import_map.time, import_map.layout.decimal
         self._reference = Reference(column, self._time.index if index is None else index)
         self._path, self._counted = path, table.counted
@@ -266,7 +273,7 @@ class _Clock:
     def read(self, line: int, row: Sequence[Text]) -> int | None:
         """Return the time stamp of a row [ns], None if it has none."""
         cell = Cell(self._path, line, str(self._reference), self._counted)
-        given = row[self._place]
+        given = row[self.place]
         text = _element(given, self._reference, cell, self._decimal)
         if not text:
             return None

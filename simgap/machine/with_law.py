@@ -51,13 +51,6 @@ class Law:
     def __str__(self) -> str:
         return self.by + (f', in proportion to {self.times}' if self.times else '')
 
-    @classmethod
-    def unknown(cls, by: str, at: FloatArray, unit: str) -> Law:
-        """Return a law of a quantity whose values at even places are not known yet."""
-        zeros = (0.0,) * at.size
-        return cls(by, '', 0.0, tuple(at.tolist()), zeros, zeros, unit, '', float(at[1] - at[0]),
-                   1.0)
-
     @property
     def shapes(self) -> FloatArray:
         """Return what its m numbers do at its k places, shape (k, m): hats, or waves of a turn."""

@@ -94,7 +94,9 @@ def within_a_turn(evidence: InputEvidence, problem: LeastSquares, point: Mapping
     for by, quantity in quantities.items():
         if not quantity.period:
             continue
-        law = Law.unknown(by, np.linspace(0.0, quantity.period, _FINEST + 1), quantity.unit)
+        at, step = np.linspace(0.0, quantity.period, _FINEST + 1, retstep=True)
+        law = Law(by, '', 0.0, tuple(at.tolist()), (0.0,) * at.size, (), quantity.unit, '',
+                  float(step), 1.0)
         weights, effect = law.weights(quantities), law.as_effect(place)
         columns = LeastSquares(
             WithLaw(problem.machine, effect, place, weights), settings=problem.settings).jacobian(

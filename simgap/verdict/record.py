@@ -17,6 +17,10 @@ from simgap.verdict.sentence import beyond, headline, loud, said
 from simgap.verdict.unknown_input import Place
 
 
+# An effect of more parameters than this is summed up instead of listed.
+_LISTED = 12
+
+
 @dataclass(frozen=True)
 class Named:
     """An answer."""
@@ -129,6 +133,8 @@ def share_text(fraction: Mapping[str, Any]) -> str:
 
 def value_lines(parameters: Mapping[str, Any]) -> list[str]:
     """Return the values of an answer's parameters as people read them, a line each."""
+    if len(parameters) > _LISTED:
+        return [f'{len(parameters)} numbers, see the JSON']
     return [f'{name.split(".", 2)[-1]} = {item["value"]:.4g} '
             + ('' if item['unit'] == '1' else f'{item["unit"]} ')
             + f'({item["ci95"][0]:.4g} to {item["ci95"][1]:.4g})'

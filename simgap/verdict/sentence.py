@@ -19,10 +19,8 @@ from simgap.verdict.spoken import percent, quantity, size, with_interval
 if TYPE_CHECKING:
     from simgap.verdict.record import Verdict
 
-# A machine without words of its own has so many numbers of an effect listed.
+# A machine without words of its own has so many numbers of an effect listed, a law its waves.
 _LISTED = 4
-# The greatest waves of a law are said.
-_WAVES = 5
 
 
 class Said(NamedTuple):
@@ -197,7 +195,7 @@ def _law(law: Law) -> str:
             f'{quantity(law.at[high], law.by_unit)}, ')
     if law.orders:
         text += 'a sum of waves a turn: ' + ', '.join(
-            f'{order} with {quantity(size, law.unit)}' for order, size in law.waves()[:_WAVES])
+            f'{order} with {quantity(size, law.unit)}' for order, size in law.waves()[:_LISTED])
     else:
         form, lacks = nearest_form(law)
         text += f'most like {form}, which lacks {percent(lacks)} of it'

@@ -49,11 +49,13 @@ def places(problem: LeastSquares, point: Mapping[str, float],
                peaks: Sequence[FloatArray], smooth: Sequence[float]) -> None:
         weighed, share, _ = evidence.of_course(
             *evidence.reduced(_seen(problem, responses)), [own.size for own in peaks], smooth)
+        # where something acts every day, a course over time has that of every day for a noise
         law = likeliest(for_laws, *for_laws.reduced(_seen(plain, responses)), {
             name: replace(quantity, values=[
                 np.interp(moments, e.time, own) for moments, e, own in zip(
                     peaks, problem.experiments, quantity.values, strict=True)])
-            for name, quantity in quantities.items()}) if plain and for_laws else None
+            for name, quantity in quantities.items()
+            if not (place.everyday and name == 'time')}) if plain and for_laws else None
         if plain and for_laws:
             fine = within_a_turn(for_laws, plain, point, place, quantities)
             law = max(filter(None, (law, fine)), key=lambda item: item.evidence, default=None)

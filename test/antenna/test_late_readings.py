@@ -128,3 +128,8 @@ def test_a_ripple_faster_than_the_samples_is_read_late_without_loss(late_s: floa
     off = np.abs(found - exact)[5:, AT['tach_1']]
     assert np.median(off) < 1e-3 * np.abs(rate).max()
     assert np.quantile(off, 0.95) < 0.01 * np.abs(rate).max()
+
+
+def test_a_verdict_may_say_how_far_a_channel_lags() -> None:
+    found = recorder_errors([{'name': 'lag:bias_voltage', 'value': 0.02}])
+    assert found.lag[AT['bias_voltage']] == 0.02
