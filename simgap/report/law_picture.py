@@ -8,7 +8,7 @@ import numpy as np
 from simgap.machine.with_law import Law
 from simgap.verdict.spoken import number
 
-WIDTH, HEIGHT = 440.0, 150.0
+WIDTH, HEIGHT, _DOTS = 440.0, 150.0, 60
 
 
 def picture(law: Law) -> dict[str, Any]:
@@ -24,7 +24,8 @@ def picture(law: Law) -> dict[str, Any]:
     def path(corners: list[tuple[float, float]]) -> str:
         return ' '.join(f'{right:.1f},{down:.1f}' for right, down in corners)
 
-    return {'box': (WIDTH, HEIGHT), 'line': path(points(y)), 'dots': points(y),
+    return {'box': (WIDTH, HEIGHT), 'line': path(points(y)),
+            'dots': points(y) if len(x) <= _DOTS else (),
             'band': path([*points(y + 2.0 * band), *reversed(points(y - 2.0 * band))]),
             'zero': points(0.0 * y)[0][1], 'low': number(low), 'high': number(high),
             'begin': number(float(x.min())), 'end': number(float(x.max()))}
