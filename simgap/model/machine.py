@@ -23,6 +23,7 @@ from simgap.model.effects import absent, ORDER_MARK, OwnCatalogue
 
 # Samples of a test that are compared unless the model says how many per second.
 _SAMPLES = 3000
+_MOST_PULSES = 1000  # that a push has in the longest test; they take the memory
 # Units of positions; with '/s' they are those of rates.
 _POSITIONS = ('rad', 'mrad', 'deg', 'turn', 'rev', 'm', 'mm', 'um')
 
@@ -145,7 +146,8 @@ class OwnMachine(Machine):
             return TimeScales.of_duration(longest)
         return TimeScales(start_s=settles, scan_s=min(longest, max(20.0 * settles,
                                                                    0.27 * longest)),
-                          pulse_s=0.1 * settles, response_s=settles, block_s=settles)
+                          pulse_s=max(0.1 * settles, longest / _MOST_PULSES),
+                          response_s=settles, block_s=settles)
 
     def offered(self, experiment: int) -> Mapping[str, tuple[str, FloatArray]]:
         log, stride = self.logs[experiment], self._strides[experiment]
