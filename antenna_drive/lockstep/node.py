@@ -38,8 +38,7 @@ from std_msgs.msg import String
 _LONGEST_WAIT_S = 0.2
 # How long a node that ends waits for others to receive its last frames [s]. A process that did not
 # run has lost what its port of shared memory had no room for. It gets that again 256 frames at a
-# time, and each time takes half a second by config/fastdds.xml, more on a busy machine. A launch
-# grants five seconds before it sends the next signal.
+# time, half a second each by config/fastdds.xml and more on a busy machine. A launch grants 5 s.
 _DELIVERY_S = 4.5
 
 _AMPERES = 'armature.physical_amperes_per_article_ampere'

@@ -5,8 +5,8 @@ A trial of designed tests: what a third test tells where two have left several a
 
 Of sealed wild cases those are kept whose first two recordings leave the answer open. Each gets a
 third test by every rule: as `antenna-drive propose` designs it, and the kinds of the standard
-programme. All are recorded on the independent antenna, and the three
-recordings are diagnosed. An interrupted trial goes on, see `results`.
+programme. All are recorded on the independent antenna, and the three recordings are diagnosed. An
+interrupted trial goes on, see `results`.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -228,7 +228,7 @@ def summary(results: TrialResults) -> dict[str, Any]:
     # no answer stands for a cause from outside the catalogue
     kept = [(item['expected'], 0.0 if item['kind'] == 'outside' else
              item['true_probability'] / (1.0 - item['unknown']))
-            for _, item in rows['proposed']
+            for _, item in rows[PROPOSED]
             if item.get('expected') is not None and item.get('unknown', 1.0) < 1.0]
     found['promise'] = {'cases': len(kept), 'expected': _mean([e for e, _ in kept]),
                         'obtained': _mean([o for _, o in kept])}

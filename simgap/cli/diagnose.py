@@ -88,7 +88,7 @@ def diagnosed(name: str, paths: Sequence[str], arguments: argparse.Namespace,
     check_options(arguments, jobs=Entry('', 1, whole=True))
     give_back_large_arrays()
     from simgap.model import diagnose_logs, load_model, read_logs, unseen
-    from simgap.model.unseen import lines as lines_of_unseen
+    from simgap.model.unseen import lines as lines_of_unseen, plain_fits
 
     model, earlier = load_model(name), earlier_of(arguments.after)
     if arguments.corrected:  # whether it can be done is told before the diagnosis
@@ -104,11 +104,12 @@ def diagnosed(name: str, paths: Sequence[str], arguments: argparse.Namespace,
             dict(numbers_of('--matters', arguments.matters)), earlier)
     write_report(arguments.report, verdict, facts(f'simgap {__version__}', name, '', paths))
     lines = _write_corrected(verdict, arguments.corrected, source) if arguments.corrected else ()
-    predicted = {log.name: unseen(verdict, log) for log in others}
-    told = [line for log in others for line in lines_of_unseen(verdict, log, predicted[log.name])]
-    data = verdict.as_data() | ({'unseen': {name: {
-        reading: vars(item) for reading, item in found.items()}
-        for name, found in predicted.items()}} if predicted else {})
+    data, told, points = verdict.as_data(), [], plain_fits(verdict) if others else ()
+    for log in others:
+        found = unseen(verdict, log, points=points)
+        told += lines_of_unseen(verdict, log, found)
+        data.setdefault('unseen', {})[log.name] = {
+            reading: vars(item) for reading, item in found.items()}
     give(data, arguments.json, '\n'.join([verdict.summary(), *told, *lines]))
     return int(verdict.word == 'too_few_to_judge')
 

@@ -61,9 +61,12 @@ class Law:
 
     def waves(self) -> list[tuple[int, float]]:
         """Return its orders with their amplitudes, the greatest first; empty for any function."""
-        numbers = np.linalg.lstsq(self.shapes, np.array(self.values), rcond=None)[0]
-        sizes = np.hypot(*np.split(numbers, 2)).tolist() if self.orders else []
+        sizes = np.hypot(*np.split(self._numbers(), 2)).tolist() if self.orders else []
         return sorted(zip(self.orders, sizes, strict=True), key=lambda wave: -wave[1])
+
+    def _numbers(self) -> FloatArray:
+        values = np.array(self.values)
+        return np.linalg.lstsq(self.shapes, values, rcond=None)[0] if self.orders else values
 
     def as_effect(self, place: DisturbanceInput) -> Effect:
         """Return the effect that it is at a place, whose sizes are its values."""
@@ -76,10 +79,9 @@ class Law:
         most = _FARTHEST * max(self.spread, *map(abs, self.values))
         names = [f'{wave} {order}' for wave in ('cos', 'sin') for order in self.orders] or [
             f'at {at:.6g}' for at in self.at]
-        starts = np.linalg.lstsq(self.shapes, np.array(self.values), rcond=None)[0]
         return Form(str(self), tuple(Parameter(
             f'{prefix}{name}', self.unit, -most, most, 0.1 * self.spread, self.spread,
-            start=start) for name, start in zip(names, starts.tolist(), strict=True)),
+            start=start) for name, start in zip(names, self._numbers().tolist(), strict=True)),
             scanned=True)
 
     def in_units(self, size: float, unit: str) -> Law:
@@ -94,9 +96,10 @@ class Law:
         at = np.array(self.at)
         factors = quantities[self.times].values if self.times else [
             np.ones_like(values) for values in quantities[self.by].values]
-        return [factor[:, np.newaxis] * np.maximum(0.0, 1.0 - np.abs(np.clip(
-            values, at.min(), at.max())[:, np.newaxis] - at) / self.width) @ self.shapes
+        hats = [factor[:, np.newaxis] * np.maximum(0.0, 1.0 - np.abs(np.clip(
+            values, at.min(), at.max())[:, np.newaxis] - at) / self.width)
             for factor, values in zip(factors, quantities[self.by].values, strict=True)]
+        return [own @ self.shapes for own in hats] if self.orders else hats
 
 
 class WithLaw(Wrapped):

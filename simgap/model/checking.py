@@ -21,8 +21,7 @@ from simgap.verdict.spoken import quantity
 # simulation is smooth.
 _ROUGH = 0.5
 _LEAST_SAMPLES = 50
-# Simulations of all tests in a usual diagnosis, for each number that it may fit: 11 to 55 on
-# joints and axes (lab/notebook/performance.md).
+# Runs of all tests for each number that may be fitted: 11 to 55 (lab/notebook/performance.md).
 _RUNS_OF_A_NUMBER = 50
 
 

@@ -138,8 +138,8 @@ class Model:
     per_test : numbers that each test has of its own, such as where it starts
     settles_s : time to settle after a push [s]; None for 5 percent of the longest test
     judged_hz : samples per second that are compared; None for at most 3000 samples of a test
-    along : further columns of the logs by unit, of which something unknown may be a function; an
-        angle in rad that turns is one of its place within a turn
+    along : units of further columns of the logs, by name, of which something unknown may be a
+        function; for an angle in rad, its place within a turn is tried as well
     blocks : the components in the order in which the signal passes them, for the picture
     advice : tests that settle what is open, a sentence each
     parallel : True if `simulate` may run in several threads at once, as compiled functions may

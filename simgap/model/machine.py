@@ -23,7 +23,7 @@ from simgap.model.effects import absent, ORDER_MARK, OwnCatalogue
 
 # Samples of a test that are compared unless the model says how many per second.
 _SAMPLES = 3000
-_MOST_PULSES = 1000  # that a push has in the longest test; they take the memory
+_MOST_PULSES = 1000  # of a push in the longest test: memory grows with their square
 # Units of positions; with '/s' they are those of rates.
 _POSITIONS = ('rad', 'mrad', 'deg', 'turn', 'rev', 'm', 'mm', 'um')
 

@@ -7,7 +7,7 @@ A free run is judged by its rms, in which a slow error counts, unlike in whitene
 numbers are fitted once more to the diagnosed logs, by plain least squares.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 import math
 
@@ -40,31 +40,27 @@ class Unseen:
     lawful: float | None = None  # with the law of what is unknown, too; None without one
 
 
-def unseen(verdict: Verdict, log: Log,
-           push: Mapping[str, FloatArray] | None = None) -> dict[str, Unseen]:
+def unseen(verdict: Verdict, log: Log, push: Mapping[str, FloatArray] | None = None,
+           points: Sequence[Point] = ()) -> dict[str, Unseen]:
     """
     Return how well a log of another test, which was not used, is predicted, by reading.
 
     Nothing is fitted to the log: a number that each test has of its own is the mean of those of
     the diagnosed tests. An effect that has a size by label has that of the log's label. `push` is
-    what is known to have entered at some of the model's places, shape (n,) each.
+    what is known to have entered at some of the model's places, shape (n,) each. `points` are
+    those of `plain_fits`, which serve every log.
     """
     whole, machine = verdict.machine, without_labels(verdict.machine)
     assert isinstance(machine, OwnMachine)
-    other = OwnMachine(machine.model, [log])
+    other, found = OwnMachine(machine.model, [log]), {}
     measured = other.experiments[0].measured
-    found = {}
-    points: list[Point] = [{}, *(refitted(whole, h) for h in (verdict.none, verdict.best))]
+    points = [{}, *(points or plain_fits(verdict))]
     if isinstance(whole, ByLabel):
         points = [whole.labels.at(point, log.labels) for point in points]
-    readings = [other.pushed(_carried(machine, log.name, point), 0, push or {})
-                for point in points]
+    points = [_carried(machine, log.name, point) for point in points]
+    readings = [other.pushed(point, 0, push or {}) for point in points[:3]]
     if verdict.lawful is not None:
-        point = refitted(verdict.lawful.machine, verdict.lawful.hypothesis)
-        if isinstance(whole, ByLabel):
-            point = whole.labels.at(point, log.labels)
-        readings.append(_with_law(verdict.lawful, other, _carried(machine, log.name, point),
-                                  push or {}))
+        readings.append(_with_law(verdict.lawful, other, points[3], push or {}))
     for j, (name, item) in enumerate(machine.model.readings.items()):
         configured, before, after, *lawful = (math.sqrt(float(np.nanmean(
             (values[:, j] - measured[:, j]) ** 2))) for values in readings)
@@ -102,6 +98,13 @@ def _with_law(lawful: LawfulFit, other: OwnMachine, point: Point,
             readings[:, experiment.channels.index(place.component)] += course
         course = lawful.law.weights(quantities_of(other, [readings]))[0] @ values
     return readings
+
+
+def plain_fits(verdict: Verdict) -> list[Point]:
+    """Return what was fitted by least squares: without effects, with the best, with a law."""
+    law, machine = verdict.lawful, verdict.machine
+    return [*(refitted(machine, h) for h in (verdict.none, verdict.best)),
+            *([refitted(law.machine, law.hypothesis)] if law else [])]
 
 
 def refitted(machine: Machine, hypothesis: Hypothesis) -> dict[str, float]:

@@ -74,7 +74,6 @@ class TestDesign:
         effort = self._effort
         drawn = [Candidate(family, self._space.draw(family, self._random), {})
                  for _ in range(effort.drawn) for family in self._space.families]
-        beyond: Sequence[Candidate] = ()
         with one_blas_thread(), ThreadPoolExecutor(self._threads) as pool:
             def each(do: Callable[[Candidate], Candidate], tests: Sequence[Candidate],
                      first: float, last: float) -> Iterator[Candidate]:
@@ -88,9 +87,8 @@ class TestDesign:
             most = effort.fitted if self._objective == SEPARATE else effort.judged
             judged = self._compared(each(self._judged, of_each_family(allowed, most), 0.3, 1.0))
             helpful = [test for test in judged if _helps(test)]
-            if not helpful:
-                beyond = self._compared(pool.map(
-                    self._judged, of_each_family(refused, effort.beyond)))
+            beyond = [] if helpful else self._compared(pool.map(
+                self._judged, of_each_family(refused, effort.beyond)))
         progress(1.0)
         return Proposal(
             self._objective, CRITERIA[self._objective], self._rivals, helpful,
@@ -177,9 +175,8 @@ class TestDesign:
 
 def _helps(test: Candidate) -> bool:
     """Return whether a test tells enough to be made."""
-    least = DEFAULT.planning.least_information
     if test.separation is not None:
-        return test.separation.information() >= least
+        return test.separation.information() >= DEFAULT.planning.least_information
     return any(math.isfinite(size) for size, _ in test.sizes.values())
 
 

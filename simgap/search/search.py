@@ -8,8 +8,9 @@ the nuisances stay close to their priors. Effects are added that a screening by 
 promises, and those that fit best when their sizes are tried out. The noise is lowered to what the
 best leaves. The best are expanded in turn by all moves (`moves`), and ranked by their evidence.
 All this is done with coarser steps of the simulation and the beginning of each test. The best are
-then fitted to the whole tests, at the noise that the best of them shows. The best one is also
-fitted with one effect less, or with two of its effects joined in one, until it stays the best.
+then fitted to the whole tests, at the noise that the best of them shows. Those that are near the
+best get derivatives of their own. Whatever fits as well as the best is also fitted with one effect
+less, and the best with two of its effects joined in one, until it stays the best.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -297,7 +298,8 @@ class Search:
             self._make(partial(moves.settled, self._problem, h, 1)
                        for h in self._ranked()[1:options.leading]
                        if h.effects and evidence(h) > evidence(best) - evidence.reach)
-            self._make([*(partial(moves.dropped, self._problem, h.with_jacobian(self._problem),
-                                  effect) for h in self._ranked() if h.cost <= best.cost
-                          for effect in h.effects), partial(moves.joined, self._problem, best)])
+            good = [h.with_jacobian(self._problem) for h in self._ranked() if h.cost <= best.cost]
+            self._make([*(partial(moves.dropped, self._problem, h, effect)
+                          for h in good for effect in h.effects),
+                        partial(moves.joined, self._problem, best)])
         return Found(self._problem, self._ranked(), self._evidence())

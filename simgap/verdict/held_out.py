@@ -12,11 +12,10 @@ from simgap.machine.contract import FloatArray
 from simgap.search.hypothesis import Hypothesis
 from simgap.verdict.judge import Judge, Withheld
 
-_TURNS = ('each recording in turn, with the effect as the others have it; offsets within the '
-          'tolerance were fitted to it, with the effect and without')
+FITTED = 'offsets within the tolerance were fitted to it, with the effect and without'
+_TURNS = f'each recording in turn, with the effect as the others have it; {FITTED}'
 _NO_GAP = 'each recording alone shows no gap: offsets within the tolerance account for it'
-_HALVES = ('the second half of the recording, with the effect as the first has it; offsets '
-           'within the tolerance were fitted to it, with the effect and without')
+_HALVES = f'the second half of the recording, with the effect as the first has it; {FITTED}'
 _INTERVAL = ("a bootstrap over blocks of time, each with a draw of the effect's numbers from "
              'their Gaussian posterior in the training data')
 BOUNDS = (-1.0, 1.0)

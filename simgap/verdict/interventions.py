@@ -14,7 +14,7 @@ from simgap.machine.by_label import ByLabel, can_be_split
 from simgap.machine.contract import FloatArray, Form, Parameter
 from simgap.search.hypothesis import Hypothesis
 from simgap.search.search import Found
-from simgap.verdict.held_out import held_out
+from simgap.verdict.held_out import FITTED, held_out
 from simgap.verdict.intervals import ci95, contrast_deviation
 
 _ROUNDS = 2
@@ -55,9 +55,9 @@ def _of_label(problem: LeastSquares, machine: ByLabel, none: Hypothesis, best: H
     numbers = _numbers(problem, machine, best, key) if best.effects else []
     common = _in_forms(problem, machine, best,
                        [machine.labels.whole(form)[0] for form in best.forms])
-    reach = held_out(problem, none, common, threads, groups,
-                     f'each value of {key} in turn, with the effect as the others have it; '
-                     'offsets within the tolerance were fitted to it, with the effect and without')
+    reach = held_out(
+        problem, none, common, threads, groups,
+        f'each value of {key} in turn, with the effect as the others have it; {FITTED}')
     return {
         'label': key,
         'tests': {value: [e.name for e, own in zip(problem.experiments, groups, strict=True)

@@ -35,11 +35,11 @@ def quantities_of(machine: Machine, readings: Sequence[FloatArray]) -> Quantitie
     moving = machine.with_experiments([replace(e, measured=own) for e, own in zip(
         machine.experiments, readings, strict=True)])
     for k, experiment in enumerate(machine.experiments):
-        motion, predicted = moving.motion(k), readings[k].T
+        motion, read = moving.motion(k), readings[k].T
         # a reading counts, where the motion has a quantity of its name
         seen = {name: (motion.unit(name), own) for name, own in motion.covariates().items()}
         seen |= {name: (unit, own) for name, unit, own in zip(
-            experiment.channels, experiment.units, predicted, strict=True)}
+            experiment.channels, experiment.units, read, strict=True)}
         for name, (unit, own) in seen.items():
             found.setdefault(name, Quantity(unit, [])).values.append(np.asarray(own))
         for name, (unit, own) in machine.offered(k).items():
@@ -103,21 +103,21 @@ def within_a_turn(evidence: InputEvidence, problem: LeastSquares, point: Mapping
             dict(point), effect.forms[0].parameters, evidence.residual, central=False)
         square, slope = evidence.reduced([
             columns[problem.rows(k)].astype(float) for k in range(len(weights))])
-        every = replace(law, orders=tuple(range(1, _FINEST // 4)))
-        waves = np.tile(every.shapes, (len(weights), 1))
-        square, slope = waves.T @ square @ waves, waves.T @ slope
+        waves = replace(law, orders=tuple(range(1, _FINEST // 4))).shapes
+        everywhere = np.tile(waves, (len(weights), 1))
+        square, slope = everywhere.T @ square @ everywhere, everywhere.T @ slope
         found = evidence.orders(square, slope)
-        law = replace(law, orders=tuple(order + 1 for order in found))
-        kept = [*found, *(order + len(every.orders) for order in found)]
+        kept = [*found, *(order + waves.shape[1] // 2 for order in found)]
         own = square[np.ix_(kept, kept)]
         if not kept or (weighed := evidence.weighed(
                 own, slope[kept], float(np.trace(own)) / len(own))).evidence <= (
                     best.evidence if best else 0.0):
             continue
-        values, deviations = law.shapes @ weighed.factors, np.sqrt(
-            law.shapes ** 2 @ weighed.deviations ** 2)
-        best = replace(law, evidence=weighed.evidence, values=tuple(values.tolist()),
-                       deviations=tuple(deviations.tolist()), spread=weighed.spread)
+        values, deviations = waves[:, kept] @ weighed.factors, np.sqrt(
+            waves[:, kept] ** 2 @ weighed.deviations ** 2)
+        best = replace(law, orders=tuple(order + 1 for order in found), spread=weighed.spread,
+                       evidence=weighed.evidence, values=tuple(values.tolist()),
+                       deviations=tuple(deviations.tolist()))
     return best
 
 

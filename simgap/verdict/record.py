@@ -16,7 +16,6 @@ from simgap.verdict.reproducibility import lines as lines_of_days
 from simgap.verdict.sentence import beyond, headline, loud, said
 from simgap.verdict.unknown_input import Place
 
-
 # An effect of more parameters than this is summed up instead of listed.
 _LISTED = 12
 
@@ -98,9 +97,8 @@ class Verdict:
 
 def _closed(verdict: Verdict) -> list[str]:
     """Return how much of the gap is closed, and by what."""
-    far, known = verdict.how_far, next(
-        answer.effects for answer in verdict.which if answer.effects != ['unknown'])
-    named = [effect for effect in known if effect != 'none']
+    far, known = verdict.how_far, [a.effects for a in verdict.which if a.effects != ['unknown']]
+    named = [effect for effect in known[0] if effect != 'none']
     judged = [effect for effect in named if effect in far['judged']]
     fraction = far['explained_fraction']
     if named and fraction['value'] is None:

@@ -49,7 +49,7 @@ def places(problem: LeastSquares, point: Mapping[str, float],
                peaks: Sequence[FloatArray], smooth: Sequence[float]) -> None:
         weighed, share, _ = evidence.of_course(
             *evidence.reduced(_seen(problem, responses)), [own.size for own in peaks], smooth)
-        # where something acts every day, a course over time has that of every day for a noise
+        # a course over time is noise of the process where something acts every day
         law = likeliest(for_laws, *for_laws.reduced(_seen(plain, responses)), {
             name: replace(quantity, values=[
                 np.interp(moments, e.time, own) for moments, e, own in zip(
