@@ -10,13 +10,11 @@ from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 from simgap.fit.broyden import Jacobian
 from simgap.fit.levenberg_marquardt import LevenbergMarquardt
-from simgap.fit.noise import innovations, whitened
-from simgap.fit.process_noise import ProcessNoise
 from simgap.fit.robust_loss import robust_level, robust_loss, robust_losses, robust_weight
 from simgap.fit.state import FitState, point_of, prior_precision
+from simgap.fit.whitener import Whitener
 from simgap.machine.contract import FloatArray, Machine, Parameter, Point
 from simgap.settings import DEFAULT, Settings
 
@@ -47,13 +45,20 @@ class LeastSquares:
         # where one experiment alone counts, the others need not be simulated
         self._alone = wanted[0] if len(wanted) == 1 else None
         self._linear: dict[str, Jacobian] = {}  # derivatives by what is linear, shape (n,) each
-        self._process: dict[int, ProcessNoise] = {}  # by experiment
+        self._whiteners = [Whitener(e, self.valid[self.rows(k)], settings.fit.runaway)
+                           for k, e in enumerate(self.experiments)]
+
+    def of(self, machine: Machine, scale: float = 1.0) -> LeastSquares:
+        """Return the problem of another machine in all samples of some of the same tests."""
+        other = LeastSquares(machine, scale=scale, settings=self.settings)
+        # what makes a test's residuals white takes long to find
+        known = {id(own.experiment): own for own in self._whiteners}
+        other._whiteners = [known.get(id(own.experiment), own) for own in other._whiteners]
+        return other
 
     def at_scale(self, scale: float) -> LeastSquares:
         """Return the same problem at another noise scale."""
-        other = LeastSquares(self.machine, scale=scale, settings=self.settings)
-        other._process = self._process
-        return other
+        return self.of(self.machine, scale)
 
     def as_stated(self) -> LeastSquares:
         """Return the same problem with the stated noise, which is white."""
@@ -75,47 +80,12 @@ class LeastSquares:
         """Return an experiment's residuals in standard deviations, shape (n c,); 0 for none."""
         if predicted is None:
             return np.zeros(self.sizes[k])
-        return self._without_process(k, self._of_sensors(k, predicted))
-
-    def _of_sensors(self, k: int, predicted: FloatArray) -> FloatArray:
-        experiment, bound = self.experiments[k], self.settings.fit.runaway
-        z = (experiment.measured - predicted) / (self.scale * experiment.noise)
-        for c, colour in enumerate(experiment.colours):
-            z[:, c] = whitened(z[:, c], colour)
-        z = z.ravel()
-        z[~self.valid[self.rows(k)]] = 0.0
-        # a prediction that diverged is a bad one, not an error
-        return np.clip(np.nan_to_num(z, copy=False, nan=bound), -bound, bound, out=z)
+        own = self._whiteners[k]
+        return own.without_process(own.of_sensors(predicted, self.scale), self.scale)
 
     def whitened(self, k: int, changes: FloatArray) -> FloatArray:
         """Return changes of readings, shape (n, c, m), as residuals have them, shape (n c, m)."""
-        z = self._innovations(k, changes / self.experiments[k].noise[..., np.newaxis])
-        z = z.reshape(self.sizes[k], -1) / self.scale
-        z[~self.valid[self.rows(k)]] = 0.0
-        return self._without_process(k, z)
-
-    def _innovations(self, k: int, changes: FloatArray) -> FloatArray:
-        """Return changes in standard deviations, shape (w, c, m), as white noise has them."""
-        for c, colour in enumerate(self.experiments[k].colours):
-            changes[:, c] = innovations(changes[:, c].T, colour).T
-        # what diverged with a change is a bad derivative, not an error
-        bound = self.settings.fit.runaway
-        return np.clip(np.nan_to_num(changes), -bound, bound)
-
-    def _without_process(self, k: int, z: FloatArray) -> FloatArray:
-        experiment = self.experiments[k]
-        if experiment.process is None:
-            return z
-        if k not in self._process:
-            white = replace(experiment.process, parts=[
-                replace(longer, values=self._innovations(
-                    k, longer.values / longer.during(experiment.noise)))
-                # a filter of slow noise goes on for a while after a response
-                for longer in (part.longer() for part in experiment.process.parts)])
-            seen = sparse.diags_array(self.valid[self.rows(k)].astype(float))
-            self._process[k] = ProcessNoise.of(
-                seen @ white.matrix(experiment.time.size), white.root)
-        return self._process[k].whitened(z, self.scale)
+        return self._whiteners[k].changes(changes, self.scale)
 
     def residuals(self, point: dict[str, float]) -> FloatArray:
         """Return the residuals at a point, shape (n,)."""
@@ -176,10 +146,12 @@ class LeastSquares:
                     if values is not None:
                         share = side / (sizes[j] * count)
                         shares[k, j] += share
-                        jacobian[self.rows(k), j] -= share * self._of_sensors(k, values)
+                        jacobian[self.rows(k), j] -= share * self._whiteners[k].of_sensors(
+                            values, self.scale)
         for k in range(len(self.experiments)):
             there = np.flatnonzero(jacobian[rows := self.rows(k)].any(axis=0))
-            jacobian[rows, there] = self._without_process(k, jacobian[rows, there])
+            jacobian[rows, there] = self._whiteners[k].without_process(
+                jacobian[rows, there], self.scale)
             if residual is not None:
                 jacobian[rows] += residual[rows, np.newaxis] * shares[k]
         for j, column in known.items():

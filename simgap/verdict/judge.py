@@ -59,7 +59,7 @@ class Judge:
         column = {p.name: j for j, p in enumerate(of_all.state.parameters)}
         slopes = np.concatenate([whole[self._problem.rows(k)] for k in part.chosen])[
             :, [column[p.name] for p in own]]
-        problem = LeastSquares(part, settings=self._settings)
+        problem = self._problem.of(part)
         start = problem.start(own, dict(begin), slopes)
         return problem.fit(start, self._settings.search.iterations)
 
@@ -67,7 +67,7 @@ class Judge:
         """Return a part's problem, and its fits without and with the effects."""
         unaided = self._fitted(part, self._none.state.parameters, self._none.state.point(),
                                self._none)
-        problem = LeastSquares(part, settings=self._settings)
+        problem = self._problem.of(part)
         if not self._best.effects:
             return problem, unaided, unaided
         # The effects are added to the fit without them. The values of the fit to all tests have
@@ -128,7 +128,7 @@ class Judge:
         testing, part = self._parts(k)
         bare = self._fitted(testing, self._none.state.parameters, self._none.state.point(),
                             self._none)
-        problem = LeastSquares(testing, settings=self._settings)
+        problem = self._problem.of(testing)
         [test] = testing.experiments
         fold = Withheld(test.name, test.time, _gap(testing, bare.point()),
                         problem.residuals_of(bare, 0))
@@ -145,7 +145,7 @@ class Judge:
                 **{p.name: found.value(p.name) for p in numbers}}
         holding = testing.holding(held)
         # the nuisances begin where all tests, or training and this test alone, have left them
-        following = LeastSquares(holding, settings=self._settings)
+        following = self._problem.of(holding)
         own = {p.name for p in testing.parameters(self._nuisances)}
         begin = min((self._best.state.point(), {**bare.point(), **found.point()}),
                     key=lambda point: following.loss(

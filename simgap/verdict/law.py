@@ -98,8 +98,7 @@ def within_a_turn(evidence: InputEvidence, problem: LeastSquares, point: Mapping
         law = Law(by, '', 0.0, tuple(at.tolist()), (0.0,) * at.size, (), quantity.unit, '',
                   float(step), 1.0)
         weights, effect = law.weights(quantities), law.as_effect(place)
-        columns = LeastSquares(
-            WithLaw(problem.machine, effect, place, weights), settings=problem.settings).jacobian(
+        columns = problem.of(WithLaw(problem.machine, effect, place, weights)).jacobian(
             dict(point), effect.forms[0].parameters, evidence.residual, central=False)
         square, slope = evidence.reduced([
             columns[problem.rows(k)].astype(float) for k in range(len(weights))])

@@ -89,7 +89,7 @@ def _added(problem: LeastSquares, base: Hypothesis, place: Place,
         machine = WithLaw(problem.machine, effect, source, [
             own / source.size for own in law.weights(quantities_of(
                 lawful.machine, predicted(lawful.machine, state.point())))])
-        lawful = LeastSquares(machine, scale=problem.scale, settings=problem.settings)
+        lawful = problem.of(machine, problem.scale)
         # one-sided: each difference runs all tests
         columns = lawful.jacobian(point, numbers, lawful.residuals(point), central=False)
         state = lawful.fit(lawful.start(
