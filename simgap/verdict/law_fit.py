@@ -72,7 +72,7 @@ def lawful_fit(found: Found, places: Sequence[Place], threads: int = 1) -> Lawfu
     if gained > 0.0:
         withheld = held_out(problem, rivals[-1], law, threads)['explained_fraction']['value']
     return LawfulFit(replace(
-        place, evidence=max(gained, 0.0), explained=max(1.0 - law.cost / rival.cost, 0.0),
+        place, evidence=place.law.evidence, explained=max(1.0 - law.cost / rival.cost, 0.0),
         law=_as_fitted(place.law, law, machine.reached, gained, withheld,
                        settings.interval)), gained, place.law, machine, law)
 
