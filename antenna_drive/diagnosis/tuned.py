@@ -55,8 +55,7 @@ def tuned(recording: Recording, drive: Drive) -> Tuned:
     state = problem.start(machine.nuisances, point)
     for _ in range(_PASSES):
         # what is not explained yet counts as noise
-        level = problem.noise_level(state.residual)
-        problem = problem.at_scale(level if level > DEFAULT.search.strong else 1.0)
+        problem = problem.at_noise(problem.noise_level(state.residual))
         state = problem.start(machine.nuisances, with_initial_conditions(problem, state.point()))
         state = problem.fit(state, _STEPS)
     return Tuned(correct(drive, machine.records, Hypothesis((), (), state)).text,

@@ -23,42 +23,35 @@ class LeastSquares:
     """
     The residuals of a machine in its experiments.
 
-    used : for each experiment the samples that are fitted, shape (n,) of bool; None for all
     scale : factor of the expected noise, above 1 while something strong is missing, so that the
         nuisances are not bent to imitate it
     """
 
-    def __init__(self, machine: Machine, used: Sequence[NDArray[np.bool_]] | None = None,
-                 scale: float = 1.0, settings: Settings = DEFAULT) -> None:
+    def __init__(self, machine: Machine, scale: float = 1.0,
+                 settings: Settings = DEFAULT) -> None:
         self.machine = machine
         self.scale = scale
         self.settings = settings
         self.experiments = list(machine.experiments)
         self.sizes = [e.measured.size for e in self.experiments]
         self.ends = np.cumsum(self.sizes)
-        self.valid = np.concatenate([
-            (np.isfinite(e.measured)
-             & (np.ones(e.time.size, bool) if used is None else used[k])[:, np.newaxis]).ravel()
-            for k, e in enumerate(self.experiments)])
+        self.valid = np.concatenate([np.isfinite(e.measured).ravel() for e in self.experiments])
         self.samples = int(self.valid.sum())
-        wanted = [k for k in range(len(self.experiments)) if self.valid[self.rows(k)].any()]
-        # where one experiment alone counts, the others need not be simulated
-        self._alone = wanted[0] if len(wanted) == 1 else None
         self._linear: dict[str, Jacobian] = {}  # derivatives by what is linear, shape (n,) each
         self._whiteners = [Whitener(e, self.valid[self.rows(k)], settings.fit.runaway)
                            for k, e in enumerate(self.experiments)]
 
     def of(self, machine: Machine, scale: float = 1.0) -> LeastSquares:
-        """Return the problem of another machine in all samples of some of the same tests."""
+        """Return the problem of another machine in some of the same tests."""
         other = LeastSquares(machine, scale=scale, settings=self.settings)
         # what makes a test's residuals white takes long to find
         known = {id(own.experiment): own for own in self._whiteners}
         other._whiteners = [known.get(id(own.experiment), own) for own in other._whiteners]
         return other
 
-    def at_scale(self, scale: float) -> LeastSquares:
-        """Return the same problem at another noise scale."""
-        return self.of(self.machine, scale)
+    def at_noise(self, level: float) -> LeastSquares:
+        """Return the problem with a misfit as noise, or the sensors' noise if it is small."""
+        return self.of(self.machine, level if level > self.settings.search.strong else 1.0)
 
     def as_stated(self) -> LeastSquares:
         """Return the same problem with the stated noise, which is white."""
@@ -89,7 +82,7 @@ class LeastSquares:
 
     def residuals(self, point: dict[str, float]) -> FloatArray:
         """Return the residuals at a point, shape (n,)."""
-        return self._row(self.machine.simulate([point], [self._alone])[0])
+        return self._row(self.machine.simulate([point])[0])
 
     def residuals_at(self, points: Sequence[Point]) -> FloatArray:
         """Return the residuals at several points, simulated together, shape (points, n)."""
@@ -111,25 +104,17 @@ class LeastSquares:
         `residual`, at the point if known, serves one-sided differences; `central` takes central
         ones where the bounds leave room. `steps` has unusual steps by name.
         """
-        variants, only, plan = [], [], []
         sizes = [steps.get(item.name, item.step) for item in parameters]
         known = self._linear_columns(parameters)
         places = {item.name: j for j, item in enumerate(parameters)}
         shared = {j: places[item.of] for j, item in enumerate(parameters) if item.of in places}
-        for j, item in enumerate(parameters):
-            if j in known or j in shared:
-                continue
-            here, step = point.get(item.name, 0.0), sizes[j]
-            # a value at a bound may be off it by a rounding error
-            room = step * (1.0 - 1e-9)
-            sides = [s for s in (1.0, -1.0) if item.low <= here + s * room <= item.high]
-            # a tread of a staircase is seen from both sides
-            if not central and len(sides) == 2 and not item.least_step:
-                sides = sides[:1]
-            for side in sides:
-                variants.append({**point, item.name: here + side * step})
-                only.append(item.experiment)
-                plan.append((j, side, len(sides)))
+        plan = [(j, step, len(own)) for j, item in enumerate(parameters)
+                if j not in known and j not in shared
+                for own in [_steps(item, point.get(item.name, 0.0), sizes[j], central)]
+                for step in own]
+        only = [parameters[j].experiment for j, *_ in plan]
+        variants = [{**point, name: point.get(name, 0.0) + step}
+                    for name, step in ((parameters[j].name, step) for j, step, _ in plan)]
         machine = self.machine.low_fidelity()
         if variants and (residual is None or machine is not self.machine):
             # both runs of a difference must have the same fidelity
@@ -141,11 +126,10 @@ class LeastSquares:
         for first in range(0, len(variants), chunk):
             part = slice(first, first + chunk)
             results = machine.simulate(variants[part], only[part])
-            for (j, side, count), result in zip(plan[part], results, strict=True):
+            for (j, step, count), result in zip(plan[part], results, strict=True):
                 for k, values in enumerate(result):
                     if values is not None:
-                        share = side / (sizes[j] * count)
-                        shares[k, j] += share
+                        shares[k, j] += (share := 1.0 / (step * count))
                         jacobian[self.rows(k), j] -= share * self._whiteners[k].of_sensors(
                             values, self.scale)
         for k in range(len(self.experiments)):
@@ -205,8 +189,6 @@ class LeastSquares:
 
     def local_steps(self, state: FitState) -> dict[str, float]:
         """Return steps of difference quotients that change the prediction by little, by name."""
-        if not state.has_hessian:
-            return {}
         options = self.settings.fit
         visible = np.sqrt(np.maximum(np.diag(state.hessian), 1e-30))
         return {p.name: min(max(options.local_step / seen, options.least_step * p.step,
@@ -247,3 +229,13 @@ class LeastSquares:
     def cost(self, residual: FloatArray, x: FloatArray, prior: FloatArray) -> float:
         """Return the sum of the robust losses and of the priors, given their precision."""
         return self.loss(residual) + float(0.5 * x @ (prior * x))
+
+
+def _steps(number: Parameter, here: float, size: float, central: bool) -> list[float]:
+    """Return the steps of a number's difference quotient."""
+    # a value at a bound may be off it by a rounding error
+    room = size * (1.0 - 1e-9)
+    steps = [side * size for side in (1.0, -1.0)
+             if number.low <= here + side * room <= number.high]
+    # a tread of a staircase is seen from both sides
+    return steps if central or number.least_step else steps[:1]

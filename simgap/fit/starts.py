@@ -41,10 +41,8 @@ def least_cost(problem: LeastSquares, trials: Sequence[dict[str, float]], experi
 def with_initial_conditions(problem: LeastSquares, point: dict[str, float]) -> dict[str, float]:
     """Return a point with the initial conditions that fit the first moments best."""
     until = problem.machine.time_scales.start_s
-    for k in range(len(problem.experiments)):
-        if not problem.valid[problem.rows(k)].any():
-            continue
-        for trials in problem.machine.nuisances.initial_conditions.get(k, ()):
+    for k, initial in problem.machine.nuisances.initial_conditions.items():
+        for trials in initial:
             _, point = least_cost(
                 problem, [point, *({**point, **trial} for trial in trials)], k, until)
     return point

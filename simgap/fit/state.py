@@ -33,11 +33,6 @@ class FitState:
         """Return the derivative of the prediction, shape (n, m); not kept, to save memory."""
         return updated(self.base_jacobian, self.broyden_errors, self.broyden_directions)
 
-    @property
-    def has_hessian(self) -> bool:
-        """Return whether the Hessian is known: a state may have dropped its derivatives."""
-        return self.kept_hessian is not None or self.base_jacobian.size > 0
-
     @cached_property
     def hessian(self) -> FloatArray:
         """Return the Gauss-Newton Hessian without the priors, shape (m, m)."""
@@ -54,10 +49,6 @@ class FitState:
     def point(self) -> dict[str, float]:
         """Return the values by name."""
         return point_of(self.parameters, self.x)
-
-    def value(self, name: str) -> float:
-        """Return one value by name."""
-        return self.point()[name]
 
 
 def point_of(parameters: Sequence[Parameter], x: FloatArray) -> dict[str, float]:

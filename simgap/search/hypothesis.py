@@ -53,7 +53,3 @@ class Hypothesis:
         if self.state.base_jacobian.size:
             return self
         return replace(self, state=problem.start(self.state.parameters, self.state.point()))
-
-    def without_jacobian(self) -> Hypothesis:
-        """Return the hypothesis without its Jacobian, which takes most of the memory."""
-        return replace(self, state=self.state.without_jacobian())

@@ -18,6 +18,7 @@ from simgap.fit.broyden import Jacobian
 from simgap.fit.least_squares import LeastSquares
 from simgap.machine import everyday
 from simgap.machine.contract import Form, Point
+from simgap.machine.part import Part
 from simgap.search.hypothesis import Hypothesis
 from simgap.search.screening import Sensitivity
 
@@ -118,18 +119,15 @@ def led(problem: LeastSquares, base: Hypothesis) -> Hypothesis:
     Where motors stick and slip, a slow test holds the fit in one of many minima. The test that
     fits best, alone, leads all to its optimum.
     """
-    state, iterations = base.state, problem.settings.search.iterations
-    count = range(len(problem.experiments))
-    loss = [problem.loss(state.residual[problem.rows(k)])
-            / max(problem.valid[problem.rows(k)].sum(), 1) for k in count]
-    alone = LeastSquares(problem.machine, [np.full(e.time.size, k == int(np.argmin(loss)))
-                                           for k, e in enumerate(problem.experiments)],
-                         settings=problem.settings)
-    point = state.point()
-    for part in (alone, problem):
-        begun = part.start(state.parameters, starts.with_initial_conditions(part, point))
-        found = starts.settled(part, part.fit(begun, iterations), 1)
-        point = found.point()
+    state, point = base.state, base.state.point()
+    loss = [problem.loss(state.residual[rows]) / max(problem.valid[rows].sum(), 1)
+            for rows in map(problem.rows, range(len(problem.experiments)))]
+    part = Part(problem.machine, [int(np.argmin(loss))])
+    for one, numbers in ((problem.of(part), part.parameters(state.parameters)),
+                         (problem, state.parameters)):
+        begun = one.start(numbers, starts.with_initial_conditions(one, point))
+        found = starts.settled(one, one.fit(begun, problem.settings.search.iterations), 1)
+        point |= found.point()
     return replace(base, state=found) if found.cost < state.cost else base
 
 

@@ -3,7 +3,7 @@
 """Screening: how much of the residual each effect could explain, by its derivative alone."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -50,11 +50,6 @@ def jacobian_of_form(problem: LeastSquares, state: FitState, form: Form) -> Jaco
         {**state.point(), **form.shapes}, [form.parameters[j] for j in sizes], state.residual,
         central=form.scanned)
     return columns
-
-
-def rescaled(known: Sequence[Sensitivity], ratio: float) -> list[Sensitivity]:
-    """Return sensitivities in the residuals of a problem whose noise is `ratio` times less."""
-    return [replace(item, jacobian=item.jacobian * ratio) for item in known]
 
 
 def same_effect(effects: Mapping[str, Effect], effect: str, others: Sequence[str]) -> bool:

@@ -19,7 +19,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from simgap.fit.broyden import Jacobian
 from simgap.fit.least_squares import LeastSquares
 from simgap.fit.noise import with_noise_left
 from simgap.fit.starts import with_initial_conditions
@@ -28,9 +27,7 @@ from simgap.search import moves
 from simgap.search.evidence import Evidence, temperature
 from simgap.search.hypothesis import Hypothesis
 from simgap.search.rival import Rival
-from simgap.search.screening import (
-    rescaled, same_effect, scan, screened, sensitivities, Sensitivity,
-)
+from simgap.search.screening import same_effect, scan, screened, sensitivities, Sensitivity
 
 Progress = Callable[[float, str], None]
 Move = Callable[[], 'Hypothesis | None']
@@ -93,7 +90,8 @@ class Search:
         # derivatives take most of the memory: the best keep theirs
         for h in self._ranked()[self._options.leading:]:
             if h.effects and h.state.base_jacobian.size:
-                self._found[frozenset(h.effects)] = h.without_jacobian()
+                self._found[frozenset(h.effects)] = replace(
+                    h, state=h.state.without_jacobian())
 
     def _evidence(self) -> Evidence:
         return Evidence.among(self._problem, list(self._found.values()))
@@ -190,7 +188,7 @@ class Search:
         nuisances, iterations = self._problem.machine.nuisances, self._options.iterations
         point = with_initial_conditions(self._problem, self._beginning())
         first = self._problem.start(nuisances, point)
-        self._problem = self._at_noise(self._problem.noise_level(first.residual))
+        self._problem = self._problem.at_noise(self._problem.noise_level(first.residual))
         state = self._problem.start(nuisances, point, first.jacobian / self._problem.scale)
         for _ in range(self._options.rounds):
             state = self._problem.fit(state, iterations)
@@ -200,7 +198,7 @@ class Search:
             if level > self._options.lower * scale and (
                     scale > 1.0 or before - state.cost < self._options.settled * before):
                 break
-            self._problem = self._at_noise(level)
+            self._problem = self._problem.at_noise(level)
             state = self._problem.start(
                 nuisances, state.point(), state.jacobian * (scale / self._problem.scale))
         return Hypothesis((), (), state)
@@ -213,35 +211,31 @@ class Search:
         return min(begins, key=lambda point: self._problem.loss(self._problem.residuals(
             with_initial_conditions(self._problem, dict(point)))))
 
-    def _at_noise(self, level: float) -> LeastSquares:
-        """Return the problem with the misfit as noise, or the sensors' noise if it is small."""
-        return self._problem.at_scale(level if level > self._options.strong else 1.0)
-
     def _lower_noise(self) -> bool:
         """Lower the noise to what the best leaves, and fit the best again; return if it fell."""
         lowered = False
         while True:
             ranked = self._ranked()
             best, before = ranked[0], self._problem.scale
-            problem = self._at_noise(self._problem.noise_level(best.state.residual))
+            problem = self._problem.at_noise(self._problem.noise_level(best.state.residual))
             if problem.scale > self._options.lower * before:
                 return lowered
             lowered = True
             self._problem = problem
-            self._sensitivities = rescaled(self._sensitivities, before / problem.scale)
+            self._sensitivities = [
+                replace(item, jacobian=item.jacobian * (before / problem.scale))
+                for item in self._sensitivities]
             self._refit(best, [self._found[frozenset()], *(
                 h for h in ranked if h.effects)][:1 + self._options.finalists])
 
     def _refit(self, anchor: Hypothesis, hypotheses: Sequence[Hypothesis]) -> None:
         """Fit hypotheses to the present problem, with derivatives where one of them has ended."""
-        slopes = self._slopes(anchor)
+        slopes = self._problem.jacobian(
+            anchor.state.point(), self._problem.machine.nuisances, None, False,
+            self._problem.local_steps(anchor.state))
         self._found = {}
         self._keep(list(self._pool.map(
             lambda h: moves.refitted(self._problem, h, anchor, slopes), hypotheses)))
-
-    def _slopes(self, at: Hypothesis) -> Jacobian:
-        return self._problem.jacobian(at.state.point(), self._problem.machine.nuisances, None,
-                                      False, self._problem.local_steps(at.state))
 
     def _continued(self, none: Hypothesis) -> list[Hypothesis]:
         """Return the answers of an earlier verdict, fitted from where they have ended."""

@@ -13,10 +13,10 @@ from simgap.fit.least_squares import LeastSquares
 from simgap.fit.starts import settled
 from simgap.fit.state import FitState, prior_precision
 from simgap.machine.contract import FloatArray, Form, Machine, Parameter
+from simgap.machine.part import Part
 from simgap.search.hypothesis import Hypothesis
 from simgap.settings import Settings
 from simgap.verdict.intervals import covariance, inflation
-from simgap.verdict.part import Part
 
 
 @dataclass(frozen=True)
@@ -142,7 +142,7 @@ class Judge:
         if not numbers:
             return fold
         held = {**dict.fromkeys(self._effects, 0.0), **self._start,
-                **{p.name: found.value(p.name) for p in numbers}}
+                **{p.name: found.point()[p.name] for p in numbers}}
         holding = testing.holding(held)
         # the nuisances begin where all tests, or training and this test alone, have left them
         following = self._problem.of(holding)

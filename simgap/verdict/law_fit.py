@@ -51,7 +51,7 @@ def lawful_fit(found: Found, places: Sequence[Place], threads: int = 1) -> Lawfu
         return None
     base, problem = found.best, found.problem.as_stated()
     level = problem.noise_level(problem.residuals(base.state.point()))
-    problem = problem.at_scale(max(level, 1.0))
+    problem = problem.at_noise(level)
     begun = replace(base, state=problem.start(base.state.parameters, base.state.point()))
     machine, law = _added(problem, begun, place, place.law)
     settings = problem.settings

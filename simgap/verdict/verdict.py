@@ -146,8 +146,6 @@ def also_seen(found: Found) -> list[dict[str, Any]]:
 def _everyday_sizes(found: Found) -> dict[str, float]:
     """Return what each everyday size of the best hypothesis gains [half chi-square], by effect."""
     state = found.best.state
-    if not state.has_hessian:
-        return {}
     effects = {p.name: effect.id for effect in found.problem.machine.catalogue.values()
                for form in effect.forms for p in form.sizes}
     gains: dict[str, float] = {}

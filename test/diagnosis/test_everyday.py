@@ -63,7 +63,7 @@ def test_an_everyday_size_stays_within_the_tolerance() -> None:
     machine = with_everyday(Table({'load.creep': 8.0 * TOLERANCE}))
     problem = LeastSquares(machine)
     state = problem.fit(problem.start(machine.nuisances, {}), 20)
-    assert state.value('everyday:load.creep.size') == pytest.approx(TOLERANCE)
+    assert state.point()['everyday:load.creep.size'] == pytest.approx(TOLERANCE)
     assert problem.noise_level(state.residual) > 2.0
 
 

@@ -45,15 +45,15 @@ def test_fit_finds_the_known_answer() -> None:
     model = Decay(0.7, 0.01)
     problem = LeastSquares(model)
     state = problem.fit(problem.start((OFFSET, RATE), {}), 20)
-    assert state.value('rate') == pytest.approx(0.7, abs=0.01)
-    assert state.value('offset') == pytest.approx(0.0, abs=0.01)
+    assert state.point()['rate'] == pytest.approx(0.7, abs=0.01)
+    assert state.point()['offset'] == pytest.approx(0.0, abs=0.01)
 
 
 def test_fit_never_leaves_the_bounds() -> None:
     model = Decay(5.0, 0.01)
     problem = LeastSquares(model)
     state = problem.fit(problem.start((OFFSET, RATE), {}), 20)
-    assert 0.0 <= state.value('rate') <= 3.0 and -1.0 <= state.value('offset') <= 1.0
+    assert 0.0 <= state.point()['rate'] <= 3.0 and -1.0 <= state.point()['offset'] <= 1.0
 
 
 def test_central_differences_are_the_derivative() -> None:
@@ -140,7 +140,7 @@ def test_an_outlier_does_not_pull() -> None:
     model.experiments[0].measured[50] += 100.0
     problem = LeastSquares(model)
     state = problem.fit(problem.start((OFFSET, RATE), {}), 20)
-    assert state.value('rate') == pytest.approx(0.7, abs=0.02)
+    assert state.point()['rate'] == pytest.approx(0.7, abs=0.02)
 
 
 @given(st.integers(1, 12), st.integers(0, 10_000))

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from simgap.fit.least_squares import LeastSquares
 from simgap.machine.contract import Effect, Experiment, FloatArray, Form, Machine, Parameter, Point
+from simgap.machine.part import Part
 from simgap.search.screening import same_effect
 from simgap.search.search import Found, Search
-from simgap.verdict.part import Part
 from springs import effect, NOISE, Springs, TIME
 
 
