@@ -36,7 +36,9 @@ class LawfulFit:
     """The likeliest law beside the best hypothesis, and how much more it makes likely."""
 
     place: Place  # with the law as it was fitted, where the motion reaches it
-    gained: float  # evidence beyond that of the best of the catalogue, with the law's price
+    # evidence beyond that of the best of the catalogue, with the law's price and the reach of what
+    # an error of form may do
+    gained: float
     law: Law  # with all its places, as it was begun with
     machine: WithLaw
     hypothesis: Hypothesis  # the best one with the law, whose values are those of its last form
@@ -67,7 +69,7 @@ def lawful_fit(found: Found, places: Sequence[Place], threads: int = 1) -> Lawfu
               for h in ([base, found.none] if base.effects else [base])]
     evidence = Evidence.among(problem, [law, *rivals])
     rival = max(rivals, key=evidence)
-    gained = evidence(law) - evidence(rival)
+    gained = evidence(law) - evidence(rival) - found.evidence.reach
     withheld = None
     if gained > 0.0:
         withheld = held_out(problem, rivals[-1], law, threads)['explained_fraction']['value']
