@@ -126,7 +126,7 @@ def prepared(tmp_path_factory: pytest.TempPathFactory) -> Path:
         record(f'whole_{name}.csv', 4.0, *(item.format(kind) for item in wave))
         assert main(['export', f'{folder}/whole_{name}.csv', f'{folder}/rec_{name}.csv',
                      '--field']) == OK
-    shutil.copytree(folder / 'run', folder / 'field_bag')
+    record('field_bag', 4.0)
     for name in ('rec_a.csv', 'rec_a.meta.json', 'rec_a.yaml'):
         if (folder / name).exists():
             shutil.copy(folder / name, folder / name.replace('rec_a', 'field'))
