@@ -42,7 +42,7 @@ class LeastSquares:
                            for k, e in enumerate(self.experiments)]
 
     def of(self, machine: Machine, scale: float = 1.0) -> LeastSquares:
-        """Return the problem of another machine in some of the same tests."""
+        """Return the problem of another machine, in all or some of the same tests."""
         other = LeastSquares(machine, scale=scale, settings=self.settings)
         # what makes a test's residuals white takes long to find
         known = {id(own.experiment): own for own in self._whiteners}
@@ -108,13 +108,13 @@ class LeastSquares:
         known = self._linear_columns(parameters)
         places = {item.name: j for j, item in enumerate(parameters)}
         shared = {j: places[item.of] for j, item in enumerate(parameters) if item.of in places}
-        plan = [(j, step, len(own)) for j, item in enumerate(parameters)
+        plan = [(j, item, step, len(own)) for j, item in enumerate(parameters)
                 if j not in known and j not in shared
                 for own in [_steps(item, point.get(item.name, 0.0), sizes[j], central)]
                 for step in own]
-        only = [parameters[j].experiment for j, *_ in plan]
-        variants = [{**point, name: point.get(name, 0.0) + step}
-                    for name, step in ((parameters[j].name, step) for j, step, _ in plan)]
+        only = [item.experiment for _, item, *_ in plan]
+        variants = [{**point, item.name: point.get(item.name, 0.0) + step}
+                    for _, item, step, _ in plan]
         machine = self.machine.low_fidelity()
         if variants and (residual is None or machine is not self.machine):
             # both runs of a difference must have the same fidelity
@@ -126,7 +126,7 @@ class LeastSquares:
         for first in range(0, len(variants), chunk):
             part = slice(first, first + chunk)
             results = machine.simulate(variants[part], only[part])
-            for (j, step, count), result in zip(plan[part], results, strict=True):
+            for (j, _, step, count), result in zip(plan[part], results, strict=True):
                 for k, values in enumerate(result):
                     if values is not None:
                         shares[k, j] += (share := 1.0 / (step * count))

@@ -50,8 +50,8 @@ class Judge:
         self._effects = {p.name for form in best.forms for p in form.parameters}
         self._nuisances = [p for p in best.state.parameters if p.name not in self._effects]
 
-    def _fitted(self, part: Part, numbers: Sequence[Parameter], begin: Mapping[str, float],
-                of_all: Hypothesis) -> FitState:
+    def _fitted(self, problem: LeastSquares, part: Part, numbers: Sequence[Parameter],
+                begin: Mapping[str, float], of_all: Hypothesis) -> FitState:
         """Fit some numbers to a part of the tests, with the derivatives of a fit to all."""
         # Where it begins has seen what is withheld; where it ends, the part alone decides. What
         # the part does not determine is not judged, see `_undetermined`.
@@ -59,15 +59,14 @@ class Judge:
         column = {p.name: j for j, p in enumerate(of_all.state.parameters)}
         slopes = np.concatenate([whole[self._problem.rows(k)] for k in part.chosen])[
             :, [column[p.name] for p in own]]
-        problem = self._problem.of(part)
         start = problem.start(own, dict(begin), slopes)
         return problem.fit(start, self._settings.search.iterations)
 
     def _trained(self, part: Part) -> tuple[LeastSquares, FitState, FitState]:
         """Return a part's problem, and its fits without and with the effects."""
-        unaided = self._fitted(part, self._none.state.parameters, self._none.state.point(),
-                               self._none)
         problem = self._problem.of(part)
+        unaided = self._fitted(problem, part, self._none.state.parameters,
+                               self._none.state.point(), self._none)
         if not self._best.effects:
             return problem, unaided, unaided
         # The effects are added to the fit without them. The values of the fit to all tests have
@@ -87,7 +86,7 @@ class Judge:
         if problem.start(found.parameters, of_all, found.base_jacobian).cost < (
                 found.cost - self._settings.evidence.number):
             found = settled(problem, self._fitted(
-                part, self._best.state.parameters, of_all, self._best), 1)
+                problem, part, self._best.state.parameters, of_all, self._best), 1)
         return problem, unaided, found
 
     def _undetermined(self, problem: LeastSquares, unaided: FitState, found: FitState,
@@ -126,9 +125,9 @@ class Judge:
     def withheld(self, k: int) -> Withheld:
         """Judge on test k what the other tests have taught."""
         testing, part = self._parts(k)
-        bare = self._fitted(testing, self._none.state.parameters, self._none.state.point(),
-                            self._none)
         problem = self._problem.of(testing)
+        bare = self._fitted(problem, testing, self._none.state.parameters,
+                            self._none.state.point(), self._none)
         [test] = testing.experiments
         fold = Withheld(test.name, test.time, _gap(testing, bare.point()),
                         problem.residuals_of(bare, 0))
@@ -145,12 +144,12 @@ class Judge:
                 **{p.name: found.point()[p.name] for p in numbers}}
         holding = testing.holding(held)
         # the nuisances begin where all tests, or training and this test alone, have left them
-        following = self._problem.of(holding)
+        following = problem.of(holding)
         own = {p.name for p in testing.parameters(self._nuisances)}
         begin = min((self._best.state.point(), {**bare.point(), **found.point()}),
                     key=lambda point: following.loss(
                         following.residuals({name: point[name] for name in own})))
-        state = self._fitted(holding, self._nuisances, begin, self._best)
+        state = self._fitted(following, holding, self._nuisances, begin, self._best)
         point = {**held, **state.point()}
         fold = replace(fold, reasons={**reasons, **self._unseen(problem, point, state.residual,
                                                                 reasons)})

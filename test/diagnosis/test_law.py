@@ -15,7 +15,7 @@ from simgap.machine.contract import (
     TimeScales,
 )
 from simgap.machine.with_law import Law
-from simgap.search.evidence import Evidence
+from simgap.search.evidence import Evidence, temperature
 from simgap.search.hypothesis import Hypothesis
 from simgap.search.search import Found
 from simgap.settings import DEFAULT
@@ -82,11 +82,12 @@ class Swing(Machine):
                 + point.get('zero', 0.0) for course in courses]
 
 
-def lawful(machine: Machine) -> LawfulFit:
-    """Return the likeliest law in the fit of a machine."""
+def lawful(machine: Machine, named: float = 0.0) -> LawfulFit:
+    """Return the likeliest law in the fit of a machine, whose named effects gain so much."""
     problem = LeastSquares(machine)
     none = Hypothesis((), (), problem.fit(problem.start(machine.nuisances, {}), 5))
-    fit = lawful_fit(Found(problem, [none], Evidence.among(problem, [none])),
+    evidence = replace(Evidence.among(problem, [none]), gain=named)
+    fit = lawful_fit(Found(problem, [none], evidence),
                      places(problem, none.state.point(), problem))
     assert fit is not None
     return fit
@@ -145,6 +146,19 @@ def test_a_law_is_tried_on_each_test_after_the_others(other: float, low: float,
     place = lawful(both(2.0 * ANGLE, 2.0 * other * ANGLE)).place
     assert place.law is not None and place.law.withheld is not None
     assert low <= place.law.withheld <= high
+
+
+def test_a_law_gains_more_than_an_error_of_form_of_what_is_named() -> None:
+    """A tenth of what a named effect gains may be an error of its form, and no law."""
+    machine = both(2.0 * ANGLE, 2.0 * ANGLE)
+    problem = LeastSquares(machine)
+    cost = temperature(problem, problem.start(machine.nuisances, {}))
+    alone = lawful(machine).gained
+    within, beyond = (lawful(machine, share * alone * cost / DEFAULT.evidence.form_error)
+                      for share in (0.5, 2.0))
+    assert within.gained == pytest.approx(0.5 * alone, rel=0.05)
+    assert beyond.gained == pytest.approx(-alone, rel=0.05)
+    assert beyond.place.law is not None and beyond.place.law.withheld is None
 
 
 def test_a_law_acts_in_the_simulation() -> None:

@@ -48,6 +48,7 @@ def test_the_torque_by_angle_predicts_the_speed_of_another_log() -> None:
     found = diagnose_logs(load_model(f'{EXAMPLE}/machine.py:motor'), [part('a', 1)])
     law = found.may_enter_at[0].law
     assert law is not None and found.may_enter_at[0].name == 'torque on the rotor'
+    assert found.where[0]['component'] == 'motor'
     order, size = law.waves()[0]
     assert order == 72 and 0.15 < size < 0.25
     speed = unseen(found, part('b', 0))['speed']
