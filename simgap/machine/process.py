@@ -7,25 +7,32 @@ Such an input may change at any rate. It is Gaussian, with as much in each octav
 a pulse and the test. Where the machine is nearly linear, it moves readings in a pattern that is
 known, the sum of answers to pulses. Where it sticks and slips, a little wind decides when, and no
 sum says what follows. How far sums hold is seen from random courses (statistical linearisation:
-R. C. Booton, IRE Transactions on Circuit Theory 1, 9, 1954).
+R. C. Booton, IRE Transactions on Circuit Theory 1, 9, 1954). What these do beyond the sums has
+patterns, too: a slip that comes late shows in all readings. Their covariance is that of the random
+courses within a short time, as in an ensemble filter (G. Evensen, J. Geophys. Res. 99, 10143,
+1994), with a small share that is white, because courses are few.
 """
 
 from dataclasses import replace
 
 import numpy as np
+from scipy import linalg
 from scipy.ndimage import uniform_filter1d
 from simgap.machine.arrays import FloatArray, Point
 from simgap.machine.experiment import Experiment
 from simgap.machine.machine import DisturbanceInput, Machine
+from simgap.machine.motion import TimeScales
 from simgap.machine.pulses import answers, root
-from simgap.machine.responses import Answers, ProcessResponses
+from simgap.machine.responses import Answers, ProcessResponses, Responses
 
 # Pulses in one of an unknown input: what resonates is moved, too.
 _FINER = 2
 # Times of change in the covariance.
 _TIMES = 8
-# Random courses.
-_DRAWS = 10
+# Random courses, time in which their patterns are taken, in pulses, and the share of these.
+_DRAWS, _BLOCK, _PATTERNS = 20, 4.0, 0.95
+# Patterns below this size do not count [noise].
+_LEAST = 1.0
 
 
 def process(machine: Machine, point: Point) -> list[ProcessResponses | None]:
@@ -72,10 +79,8 @@ def _of_place(machine: Machine, point: Point, place: DisturbanceInput) -> list[P
 
     seen = [[np.nan_to_num(one - none) for one, none in zip(
         disturbed(heights), still, strict=True)] for heights in draws.T]
-    return [_linearised(own, own.summed(draws[:own.times.size], len(still[k])),
-                        np.stack([row[k] for row in seen], axis=-1),
-                        2.0 * machine.time_scales.response_s / float(
-                            np.median(np.diff(machine.experiments[k].time))))
+    return [_linearised(machine.experiments[k], machine.time_scales, own, own.summed(
+        draws[:own.times.size], len(still[k])), np.stack([row[k] for row in seen], axis=-1))
             for k, own in enumerate(found)]
 
 
@@ -84,16 +89,40 @@ def _root(count: int) -> FloatArray:
     return root(count, np.geomspace(1.0, count, _TIMES))
 
 
-def _linearised(own: Answers, summed: FloatArray, seen: FloatArray,
-                window: float) -> ProcessResponses:
-    """Return answers in so far as their sums say what was seen; both have the shape (n, c, d)."""
-    def mean(products: FloatArray) -> FloatArray:
+def _linearised(experiment: Experiment, scales: TimeScales, own: Answers, summed: FloatArray,
+                seen: FloatArray) -> ProcessResponses:
+    """Return answers in so far as their sums say what was seen, and patterns of what they miss."""
+    # what was summed and seen in d random courses has the shape (n, c, d)
+    interval = float(np.median(np.diff(experiment.time)))
+
+    def smooth(power: FloatArray) -> FloatArray:
         # a running sum may end a little below zero
         return np.asarray(uniform_filter1d(
-            products.mean(axis=-1), max(int(window), 1), axis=0)).clip(0.0)
+            power, max(int(2.0 * scales.response_s / interval), 1), axis=0)).clip(0.0)
 
-    share = np.clip(mean(summed * seen) / np.maximum(mean(summed ** 2), 1e-30), 0.0, 1.0)
-    beyond = mean((seen - share[..., np.newaxis] * summed) ** 2)
+    share = np.clip(smooth((summed * seen).mean(axis=-1)) / np.maximum(
+        smooth((summed ** 2).mean(axis=-1)), 1e-30), 0.0, 1.0)
+    missed = seen - share[..., np.newaxis] * summed
+    patterns, told = _patterns(missed, experiment.noise,
+                               max(int(_BLOCK * scales.pulse_s / interval), 1))
     return ProcessResponses(
-        [replace(part, values=part.values * part.during(share)) for part in own.parts],
-        own.mixed @ _root(own.times.size), np.sqrt(beyond))
+        [*(replace(part, values=part.values * part.during(share)) for part in own.parts),
+         *patterns], linalg.block_diag(own.mixed @ _root(own.times.size), *(
+             np.eye(part.first.size) for part in patterns)),
+        np.sqrt(smooth((missed ** 2).mean(axis=-1) - told)))
+
+
+def _patterns(missed: FloatArray, noise: FloatArray,
+              block: int) -> tuple[list[Responses], FloatArray]:
+    """Return the patterns of random courses in each block of time, and their variance, (n, c)."""
+    first, values, told = [], [], np.zeros(noise.shape)
+    for begin in range(0, len(missed), block):
+        rows = slice(begin, begin + block)
+        courses = (missed[rows] / noise[rows, :, np.newaxis]).reshape(-1, missed.shape[-1])
+        turns, sizes, _ = np.linalg.svd(
+            courses * (_PATTERNS / missed.shape[-1]) ** 0.5, full_matrices=False)
+        for pattern in (turns * sizes)[:, sizes > _LEAST].T:
+            first.append(begin)
+            values.append(pattern.reshape(noise[rows].shape) * noise[rows])
+            told[rows] += values[-1] ** 2
+    return [Responses.of(first, values)] if first else [], told

@@ -20,16 +20,16 @@ def enough(problem: LeastSquares) -> bool:
 def remainders(problem: LeastSquares, state: FitState,
                limits: Mapping[str, float]) -> dict[str, dict[str, Any]]:
     """Return what a hypothesis leaves of each signal, for the JSON; `limits` say what matters."""
-    predicted = problem.machine.simulate([state.point()])[0]
+    left = [without_process(e, e.measured - values, problem.settings.noise.clip)
+            for e, values in zip(problem.experiments, problem.machine.simulate(
+                [state.point()])[0], strict=True) if values is not None]
     found: dict[str, dict[str, Any]] = {}
     first = problem.experiments[0]
     for c, (channel, unit) in enumerate(zip(first.channels, first.units, strict=True)):
         gaps, noises = [], []
-        for experiment, values in zip(problem.experiments, predicted, strict=True):
-            assert values is not None
-            there = np.isfinite(experiment.measured[:, c]) & np.isfinite(values[:, c])
-            gaps.append(without_process(experiment, experiment.measured - values,
-                                        problem.settings.noise.clip)[there, c])
+        for experiment, rest in zip(problem.experiments, left, strict=True):
+            there = np.isfinite(rest[:, c])
+            gaps.append(rest[there, c])
             level = experiment.colours[c].level if experiment.colours else 1.0
             noises.append(level * experiment.noise[there, c])
         gap, noise = np.concatenate(gaps), np.concatenate(noises)

@@ -75,27 +75,30 @@ def test_a_linear_machine_is_moved_as_the_covariance_says() -> None:
     for apart in (TIME.size // 50, TIME.size // 10):
         assert np.diag(covariance, apart)[inner] == pytest.approx(
             np.diag(sampled, apart)[inner], abs=0.2 * float(said.max()) ** 2)
-    assert not said[:, 1].any()
+    assert np.all(said[:, 1] < 1e-12)
     assert np.all(found.beyond[inner, 0] < 0.2 * said[inner, 0])
 
 
-def test_where_sums_say_nothing_all_is_noise() -> None:
+def test_where_sums_say_nothing_patterns_do() -> None:
+    """Other courses than those that were drawn vary as much, and alike at times close together."""
     [found] = process(calm_machine(Hunting), {})
     assert found is not None
     late = 30.0 * np.cumsum(courses(300), axis=1) * TIME[1]
     apart = np.sin(2.0 * np.pi * 1.5 * TIME + late) - np.sin(2.0 * np.pi * 1.5 * TIME)
     end = slice(TIME.size // 2, -TIME.size // 10)
-    assert np.mean(found.beyond[end, 0]) == pytest.approx(
-        np.sqrt(np.mean(apart[:, end] ** 2)), rel=0.3)
-    moves = found.matrix(TIME.size) @ found.root
-    summed = np.sqrt((moves ** 2).sum(axis=-1)).reshape(TIME.size, 2)
-    assert np.mean(summed[end, 0]) < 0.5 * np.mean(found.beyond[end, 0])
+    moves = (found.matrix(TIME.size) @ found.root).reshape(TIME.size, 2, -1)[:, 0]
+    told, power = np.sum(moves[end] ** 2, axis=-1).mean(), np.mean(apart[:, end] ** 2)
+    assert told + np.mean(found.beyond[end, 0] ** 2) == pytest.approx(power, rel=0.3)
+    assert told > 0.8 * power
+    near = 5  # samples, in a block of 30
+    assert np.mean(np.sum(moves[near:] * moves[:-near], axis=-1)[end]) == pytest.approx(
+        np.mean((apart[:, near:] * apart[:, :-near])[:, end]), rel=0.3)
 
 
 def test_noise_beyond_the_sums_is_added_once() -> None:
     machine = with_everyday(calm_machine(Hunting))
     [one] = machine.experiments
-    assert np.median(one.noise[:, 0]) > 10.0 * np.median(one.noise[:, 1])
+    assert np.median(one.noise[:, 0]) > 3.0 * np.median(one.noise[:, 1])
     again = machine.with_experiments([replace(one, colours=())])
     assert again.experiments[0].noise == pytest.approx(one.noise, rel=1e-9)
     bare = calm(one)
