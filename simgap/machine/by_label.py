@@ -177,9 +177,6 @@ class ByLabel(Wrapped):
                          _LabelledCatalogue(inner.catalogue, labels))
         self.labels = labels
 
-    def predict(self, point: Point, experiment: int) -> FloatArray:
-        return self.inner.predict(self.labels.in_test(point, experiment), experiment)
-
     def simulate(self, points: Sequence[Point], only: Sequence[int | None] | None = None,
                  until: float = math.inf) -> list[list[FloatArray | None]]:
         count = len(self.experiments)
@@ -213,9 +210,6 @@ class ByLabel(Wrapped):
 
     def linearised_at(self, point: Point) -> Machine:
         return self.around(self.inner.linearised_at(self.labels.mean(point)))
-
-    def linear_response(self, name: str, experiment: int) -> FloatArray | None:
-        return self.inner.linear_response(name, experiment)
 
 
 def can_be_split(form: Form) -> bool:

@@ -165,10 +165,6 @@ class _Everyday(Wrapped):
             self._last[experiment] = same, added
         return np.asarray(readings + added)
 
-    def predict(self, point: Point, experiment: int) -> FloatArray:
-        inner, sizes = self._parted(point)
-        return self._with(self.inner.predict(inner, experiment), experiment, sizes)
-
     def simulate(self, points: Sequence[Point], only: Sequence[int | None] | None = None,
                  until: float = math.inf) -> list[list[FloatArray | None]]:
         parted = [self._parted(point) for point in points]

@@ -178,6 +178,11 @@ class Wrapped(Machine):
     def around(self, inner: Machine) -> Machine:
         """Return the same around another inner machine."""
 
+    def predict(self, point: Point, experiment: int) -> FloatArray:
+        found = self.simulate([point], [experiment])[0][experiment]
+        assert found is not None
+        return found
+
     @property
     def time_scales(self) -> TimeScales:
         return self.inner.time_scales
@@ -199,3 +204,6 @@ class Wrapped(Machine):
 
     def without(self, effects: Collection[str]) -> Machine:
         return self.around(self.inner.without(effects))
+
+    def linear_response(self, name: str, experiment: int) -> FloatArray | None:
+        return self.inner.linear_response(name, experiment)

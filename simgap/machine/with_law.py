@@ -143,11 +143,6 @@ class WithLaw(Wrapped):
         values = self._weights[experiment] @ sizes
         return lambda time: np.interp(time, self.experiments[experiment].time, values)
 
-    def predict(self, point: Point, experiment: int) -> FloatArray:
-        found = self.simulate([point], [experiment])[0][experiment]
-        assert found is not None
-        return found
-
     def simulate(self, points: Sequence[Point], only: Sequence[int | None] | None = None,
                  until: float = math.inf) -> list[list[FloatArray | None]]:
         wanted = only or [None] * len(points)

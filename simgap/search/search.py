@@ -17,6 +17,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import islice
 
 import numpy as np
 from simgap.fit.least_squares import LeastSquares
@@ -81,11 +82,13 @@ class Search:
     # -- the hypotheses ------------------------------------------------------------------------
 
     def _keep(self, hypotheses: Iterable[Hypothesis | None]) -> None:
-        """Keep hypotheses; of those with the same effects the better one."""
+        """Keep hypotheses; of those with the same effects the better one, net of its numbers."""
+        def cost(h: Hypothesis) -> float:
+            return h.cost + self._problem.settings.evidence.number * len(h.state.parameters)
         for h in hypotheses:
             if h is not None:
                 known = self._found.get(frozenset(h.effects))
-                if known is None or h.cost < known.cost:
+                if known is None or cost(h) < cost(known):
                     self._found[frozenset(h.effects)] = h
         # derivatives take most of the memory: the best keep theirs
         for h in self._ranked()[self._options.leading:]:
@@ -100,7 +103,10 @@ class Search:
         return self._evidence().ranked(list(self._found.values()))
 
     def _make(self, wanted: Iterable[Move]) -> None:
-        self._keep(self._pool.map(lambda move: move(), wanted))
+        # each has derivatives, which take memory until it is kept
+        moves_left = iter(wanted)
+        while some := list(islice(moves_left, self._options.finalists)):
+            self._keep(self._pool.map(lambda move: move(), some))
 
     # -- the moves -----------------------------------------------------------------------------
 
@@ -111,7 +117,7 @@ class Search:
         for gain, item in screened(
                 problem, base.state, self._sensitivities, base.effects)[:count]:
             price = evidence.price((*base.forms, item.form))
-            if unpaid + options.hope * gain / evidence.temperature - price > top:
+            if unpaid + options.hope * gain - price > top:
                 yield partial(moves.added, problem, base, item)
         if scanning and self._leaves_much(base):
             for item, sizes in scan(problem, base.state, self._sensitivities, base.effects):

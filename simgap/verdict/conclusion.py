@@ -18,7 +18,6 @@ from simgap.settings import Settings
 from simgap.verdict import unknown_input, verdict
 from simgap.verdict.held_out import held_out
 from simgap.verdict.intervals import deviations, inflation, jackknife
-from simgap.verdict.interventions import simplified
 from simgap.verdict.lack_of_fit import enough
 from simgap.verdict.law_fit import lawful_fit, LawfulFit
 
@@ -39,8 +38,7 @@ class Conclusion:
 def concluded(machine: Machine, progress: Callable[[float, str], None], threads: int,
               settings: Settings, earlier: Sequence[Rival] = ()) -> Conclusion:
     """Search, withhold and decide; parameters as in `diagnosis.diagnose`."""
-    found = simplified(Search(
-        LeastSquares(machine, settings=settings), progress, threads, earlier).run())
+    found = Search(LeastSquares(machine, settings=settings), progress, threads, earlier).run()
     best = found.best.with_jacobian(found.problem)
     progress(0.8, 'withheld data')
     reach = held_out(found.problem, found.none, best, threads)

@@ -3,7 +3,6 @@
 """What an intervention changes: the numbers of the named effects under each value of a label."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 import math
 from typing import Any
 
@@ -13,7 +12,6 @@ from simgap.fit.state import FitState
 from simgap.machine.by_label import ByLabel, can_be_split
 from simgap.machine.contract import FloatArray, Form, Parameter
 from simgap.search.hypothesis import Hypothesis
-from simgap.search.search import Found
 from simgap.verdict.held_out import FITTED, held_out
 from simgap.verdict.intervals import ci95, contrast_deviation
 
@@ -27,26 +25,6 @@ def interventions(problem: LeastSquares, none: Hypothesis, best: Hypothesis,
     if not isinstance(machine, ByLabel):
         return []
     return [_of_label(problem, machine, none, best, key, threads) for key in machine.labels.groups]
-
-
-def simplified(found: Found) -> Found:
-    """Return what was found with a best that has sizes by label only where these differ."""
-    # The search takes an effect's form where others are still missing, and a missing effect that
-    # differs makes it look as if this one did.
-    problem, best, machine = found.problem, found.best, found.problem.machine
-    if not isinstance(machine, ByLabel):
-        return found
-    whole = best.with_jacobian(problem)
-    forms = []
-    for form in best.forms:
-        base, own = machine.labels.whole(form)[0], [p.label for p in form.sizes if p.label]
-        values = [value for _, value in dict.fromkeys(own)]
-        differs = any(_compared(
-            problem, whole.state, size, [_of_value(form, own[0][0], value)[j] for value in values],
-            values)['differs'] for j, size in enumerate(base.sizes)) if own else True
-        forms.append(form if differs else base)
-    simpler = _in_forms(problem, machine, best, forms)
-    return replace(found, hypotheses=[simpler, *found.hypotheses[1:]])
 
 
 def _of_label(problem: LeastSquares, machine: ByLabel, none: Hypothesis, best: Hypothesis,
