@@ -66,7 +66,7 @@ def _outside(problem: LeastSquares, state: FitState) -> tuple[str, ...]:
     """Return the signals of which a fit of the tolerances leaves more than noise."""
     [test] = problem.experiments
     predicted = problem.machine.predict(state.point(), 0)
-    left = problem.residuals_of(state, 0)
+    left = problem.of_test(state.residual, 0)
     found = []
     for column, reading in enumerate(READINGS):
         there = np.isfinite(left[:, column])

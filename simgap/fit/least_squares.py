@@ -63,10 +63,10 @@ class LeastSquares:
         end = int(self.ends[experiment])
         return slice(end - self.sizes[experiment], end)
 
-    def residuals_of(self, state: FitState, experiment: int) -> FloatArray:
+    def of_test(self, residual: FloatArray, experiment: int) -> FloatArray:
         """Return an experiment's residuals, NaN where nothing was measured, shape (n, c)."""
         rows = self.rows(experiment)
-        z = np.where(self.valid[rows], state.residual[rows], np.nan)
+        z = np.where(self.valid[rows], residual[rows], np.nan)
         return np.asarray(z.reshape(self.experiments[experiment].measured.shape))
 
     def standardised(self, k: int, predicted: FloatArray | None) -> FloatArray:

@@ -110,7 +110,7 @@ def temperature(problem: LeastSquares, state: FitState) -> float:
     # the effective number of samples of a first-order process: n (1 - f) / (1 + f)
     counts, factors = [], []
     for k in range(len(problem.experiments)):
-        for z in problem.residuals_of(state, k).T:
+        for z in problem.of_test(state.residual, k).T:
             pairs = np.isfinite(z[1:]) & np.isfinite(z[:-1])
             if pairs.sum() < problem.settings.noise.least_samples:
                 continue

@@ -130,7 +130,7 @@ class Judge:
                             self._none.state.point(), self._none)
         [test] = testing.experiments
         fold = Withheld(test.name, test.time, _gap(testing, bare.point()),
-                        problem.residuals_of(bare, 0))
+                        problem.of_test(bare.residual, 0))
         if not self._best.effects:
             return fold
         training, unaided, found = self._trained(part)
@@ -213,20 +213,14 @@ class Judge:
         return replace(
             fold, judged=tuple(e for e in self._best.effects if e not in fold.reasons),
             gap_after=_gap(problem.machine, point),
-            after=_shaped(problem, state.residual),
+            after=problem.of_test(state.residual, 0),
             names=tuple(p.name for p in numbers), values=found.x[places],
-            drawn=np.array([_shaped(problem, z) for z in drawn]))
+            drawn=np.array([problem.of_test(z, 0) for z in drawn]))
 
 
 def _gap(machine: Machine, point: Mapping[str, float]) -> FloatArray:
     """Return measured minus predicted of a single test, shape (n, c)."""
     return machine.experiments[0].measured - machine.predict(point, 0)
-
-
-def _shaped(problem: LeastSquares, residual: FloatArray) -> FloatArray:
-    """Return the residuals of a single test, NaN where nothing is judged, shape (n, c)."""
-    shape = problem.experiments[0].measured.shape
-    return np.where(problem.valid, residual, np.nan).reshape(shape)
 
 
 def _deviations(form: Form, found: FitState, posterior: FloatArray) -> float:

@@ -27,8 +27,8 @@ def of_effects(problem: LeastSquares, answers: Sequence[Answer], none: FitState,
             part = problem.machine.catalogue[effect].component
             share = answer.probability / len(answer.effects)
             parts[part] = parts.get(part, 0.0) + share
-    return _located(problem, parts, lambda k: problem.residuals_of(none, k) ** 2
-                    - problem.residuals_of(best, k) ** 2)
+    return _located(problem, parts, lambda k: problem.of_test(none.residual, k) ** 2
+                    - problem.of_test(best.residual, k) ** 2)
 
 
 def of_the_unknown(problem: LeastSquares, none: FitState,
@@ -47,7 +47,7 @@ def of_the_unknown(problem: LeastSquares, none: FitState,
 def _acts(problem: LeastSquares, none: FitState, signal: str) -> Iterator[dict[str, Any]]:
     """Yield when a signal's residual is loud, of tests in which that begins or ends."""
     for k, experiment in enumerate(problem.experiments):
-        residual = problem.residuals_of(none, k)[:, experiment.channels.index(signal)]
+        residual = problem.of_test(none.residual, k)[:, experiment.channels.index(signal)]
         there, regimes = np.isfinite(residual), problem.machine.motion(k).regimes()
         moves = np.array([name != 'stick' for name in regimes.names])[regimes.labels]
         span = loud_span(residual[there], moves[there], problem.settings.localisation)
