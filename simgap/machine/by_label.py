@@ -148,6 +148,9 @@ class _LabelledCatalogue(Catalogue):
         return [*whole, *(self._labels.split(form, key) for form in whole if can_be_split(form)
                           for key in self._labels.groups)]
 
+    def whole(self, form: Form) -> Form:
+        return self._labels.whole(form)[0]
+
     def typical_form(self, effect: Effect) -> Form:
         return self._inner.typical_form(effect)
 

@@ -35,6 +35,10 @@ class Catalogue(dict[str, Effect]):
         """Return the forms of an effect worth a fit; residuals are measured minus predicted."""
         return effect.forms
 
+    def whole(self, form: Form) -> Form:
+        """Return the form with one size for all tests."""
+        return form
+
     def typical_form(self, effect: Effect) -> Form:
         """Return the form of an effect by which planned tests are judged."""
         return effect.forms[0]

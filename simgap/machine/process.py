@@ -72,13 +72,9 @@ def _of_place(machine: Machine, point: Point, place: DisturbanceInput) -> list[P
     random = np.random.default_rng(0)
     draws = _root(longest.size) @ random.standard_normal((_DRAWS, longest.size)).T
     still = [machine.predict(point, k) for k in range(len(found))]
-
-    def disturbed(heights: FloatArray) -> list[FloatArray]:
-        return machine.simulate_disturbed(point, place, [
-            lambda time: place.everyday * np.interp(time, longest, heights)] * len(still))
-
-    seen = [[np.nan_to_num(one - none) for one, none in zip(
-        disturbed(heights), still, strict=True)] for heights in draws.T]
+    seen = [[np.nan_to_num(one - none) for one, none in zip(machine.simulate_disturbed(
+        point, place, [lambda time: place.everyday * np.interp(time, longest, heights)]
+        * len(still)), still, strict=True)] for heights in draws.T]
     return [_linearised(machine.experiments[k], machine.time_scales, own, own.summed(
         draws[:own.times.size], len(still[k])), np.stack([row[k] for row in seen], axis=-1))
             for k, own in enumerate(found)]

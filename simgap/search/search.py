@@ -10,7 +10,7 @@ best leaves. The best are expanded in turn by all moves (`moves`), and ranked by
 All this is done with coarser steps of the simulation and the beginning of each test. The best are
 then fitted to the whole tests, at the noise that the best of them shows. Those that are near the
 best get derivatives of their own. Whatever fits as well as the best is also fitted with one effect
-less, and the best with two of its effects joined in one, until it stays the best.
+less, and the best with two effects joined in one, or one size for all labels, until it stays.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -284,10 +284,10 @@ class Search:
             self._problem.machine.linearised_at(point), point, settings.noise,
             settings.noise.greatest_level), settings=settings)
         self._refit(best, [best, none, *(h for h in chosen if h.effects != best.effects)])
-        judged: set[frozenset[str]] = set()
-        while frozenset((best := self._ranked()[0]).effects) not in judged:
+        judged, catalogue = set[frozenset[Form]](), self._problem.machine.catalogue
+        while frozenset((best := self._ranked()[0]).forms) not in judged:
             self._progress(0.75, 'the best in full')
-            judged.add(frozenset(best.effects))
+            judged.add(frozenset(best.forms))
             best = moves.settled(self._problem, best, options.passes)
             self._keep([best])
             # they are comparable once each has begun where the best has ended
@@ -301,5 +301,8 @@ class Search:
             good = [h.with_jacobian(self._problem) for h in self._ranked() if h.cost <= best.cost]
             self._make([*(partial(moves.dropped, self._problem, h, effect)
                           for h in good for effect in h.effects),
-                        partial(moves.joined, self._problem, best)])
+                        partial(moves.joined, self._problem, best),
+                        *(partial(moves.exchanged, self._problem, best, effect, effect, whole)
+                          for effect, form in best.items
+                          if (whole := catalogue.whole(form)) is not form)])
         return Found(self._problem, self._ranked(), self._evidence())
