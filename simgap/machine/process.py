@@ -31,8 +31,8 @@ _FINER = 2
 _TIMES = 8
 # Random courses, time in which their patterns are taken, in pulses, and the share of these.
 _DRAWS, _BLOCK, _PATTERNS = 20, 4.0, 0.95
-# Patterns below this size do not count [noise].
-_LEAST = 1.0
+# The least size of a pattern, and the greatest of a course, which may diverge [noise].
+_LEAST, _MOST = 1.0, 1e4
 
 
 def process(machine: Machine, point: Point) -> list[ProcessResponses | None]:
@@ -99,8 +99,9 @@ def _linearised(experiment: Experiment, scales: TimeScales, own: Answers, summed
     share = np.clip(smooth((summed * seen).mean(axis=-1)) / np.maximum(
         smooth((summed ** 2).mean(axis=-1)), 1e-30), 0.0, 1.0)
     missed = seen - share[..., np.newaxis] * summed
-    patterns, told = _patterns(missed, experiment.noise,
-                               max(int(_BLOCK * scales.pulse_s / interval), 1))
+    there = np.isfinite(experiment.measured)
+    patterns, told = _patterns(missed * there[..., np.newaxis], np.where(
+        there, experiment.noise, 1.0), max(int(_BLOCK * scales.pulse_s / interval), 1))
     return ProcessResponses(
         [*(replace(part, values=part.values * part.during(share)) for part in own.parts),
          *patterns], linalg.block_diag(own.mixed @ _root(own.times.size), *(
@@ -114,9 +115,9 @@ def _patterns(missed: FloatArray, noise: FloatArray,
     first, values, told = [], [], np.zeros(noise.shape)
     for begin in range(0, len(missed), block):
         rows = slice(begin, begin + block)
-        courses = (missed[rows] / noise[rows, :, np.newaxis]).reshape(-1, missed.shape[-1])
-        turns, sizes, _ = np.linalg.svd(
-            courses * (_PATTERNS / missed.shape[-1]) ** 0.5, full_matrices=False)
+        courses = np.clip(missed[rows] / noise[rows, :, np.newaxis], -_MOST, _MOST)
+        turns, sizes, _ = np.linalg.svd((_PATTERNS / _DRAWS) ** 0.5 * courses.reshape(
+            -1, _DRAWS), full_matrices=False)
         for pattern in (turns * sizes)[:, sizes > _LEAST].T:
             first.append(begin)
             values.append(pattern.reshape(noise[rows].shape) * noise[rows])

@@ -102,10 +102,9 @@ class Search:
     def _ranked(self) -> list[Hypothesis]:
         return self._evidence().ranked(list(self._found.values()))
 
-    def _make(self, wanted: Iterable[Move]) -> None:
+    def _make(self, wanted: Iterator[Move]) -> None:
         # each has derivatives, which take memory until it is kept
-        moves_left = iter(wanted)
-        while some := list(islice(moves_left, self._options.finalists)):
+        while some := list(islice(wanted, self._options.finalists)):
             self._keep(self._pool.map(lambda move: move(), some))
 
     # -- the moves -----------------------------------------------------------------------------
@@ -299,10 +298,10 @@ class Search:
                        for h in self._ranked()[1:options.leading]
                        if h.effects and evidence(h) > evidence(best) - evidence.reach)
             good = [h.with_jacobian(self._problem) for h in self._ranked() if h.cost <= best.cost]
-            self._make([*(partial(moves.dropped, self._problem, h, effect)
-                          for h in good for effect in h.effects),
-                        partial(moves.joined, self._problem, best),
-                        *(partial(moves.exchanged, self._problem, best, effect, effect, whole)
-                          for effect, form in best.items
-                          if (whole := catalogue.whole(form)) is not form)])
+            self._make(iter([
+                *(partial(moves.dropped, self._problem, h, effect)
+                  for h in good for effect in h.effects),
+                *(partial(moves.exchanged, self._problem, best, effect, effect, whole)
+                  for effect, form in best.items if (whole := catalogue.whole(form)) is not form),
+                partial(moves.joined, self._problem, best)]))
         return Found(self._problem, self._ranked(), self._evidence())

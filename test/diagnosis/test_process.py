@@ -95,6 +95,19 @@ def test_where_sums_say_nothing_patterns_do() -> None:
         np.mean((apart[:, near:] * apart[:, :-near])[:, end]), rel=0.3)
 
 
+def test_a_gap_in_a_recording_leaves_the_rest() -> None:
+    """Where nothing was measured, the noise may be anything."""
+    whole = calm_machine(Hunting)
+    [one] = whole.experiments
+    measured, noise = one.measured.copy(), one.noise.copy()
+    measured[300:330], noise[300:330] = np.nan, np.nan
+    [found], [gap] = process(whole, {}), process(whole.with_experiments(
+        [replace(one, measured=measured, noise=noise)]), {})
+    assert found is not None and gap is not None
+    assert gap.beyond[TIME.size // 2:] == pytest.approx(found.beyond[TIME.size // 2:])
+    assert np.isfinite(gap.beyond).all() and np.isfinite(gap.matrix(TIME.size).data).all()
+
+
 def test_noise_beyond_the_sums_is_added_once() -> None:
     machine = with_everyday(calm_machine(Hunting))
     [one] = machine.experiments
