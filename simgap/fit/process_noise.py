@@ -3,9 +3,9 @@
 """
 Noise of the process, such as wind: it moves the machine, and so shows in all readings at once.
 
-Its covariance U K U^T, with responses U to pulses and the covariance K of their heights, is added
-to that of the sensors. Nothing is fitted: residuals are made white under the sum. Where the
-sensors' noise is white, a residual along an eigenvector counts by 1 / (1 + s^2), with the
+Its covariance U K U^T, with responses U to pulses or patterns and the covariance K of their sizes,
+is added to that of the sensors. Nothing is fitted: residuals are made white under the sum. Where
+the sensors' noise is white, a residual along an eigenvector counts by 1 / (1 + s^2), with the
 process' deviation s.
 """
 

@@ -115,11 +115,11 @@ def _patterns(missed: FloatArray, noise: FloatArray,
     first, values, told = [], [], np.zeros(noise.shape)
     for begin in range(0, len(missed), block):
         rows = slice(begin, begin + block)
-        courses = np.clip(missed[rows] / noise[rows, :, np.newaxis], -_MOST, _MOST)
-        turns, sizes, _ = np.linalg.svd((_PATTERNS / _DRAWS) ** 0.5 * courses.reshape(
-            -1, _DRAWS), full_matrices=False)
-        for pattern in (turns * sizes)[:, sizes > _LEAST].T:
+        courses = (_PATTERNS / _DRAWS) ** 0.5 * np.clip(
+            missed[rows] / noise[rows, :, np.newaxis], -_MOST, _MOST)
+        _, sizes, sums = np.linalg.svd(courses.reshape(-1, _DRAWS), full_matrices=False)
+        for own in sums[sizes > _LEAST]:
             first.append(begin)
-            values.append(pattern.reshape(noise[rows].shape) * noise[rows])
+            values.append(courses @ own * noise[rows])
             told[rows] += values[-1] ** 2
     return [Responses.of(first, values)] if first else [], told

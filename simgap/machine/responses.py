@@ -85,7 +85,7 @@ class ProcessResponses(_Parts):
     """
     What acts on a machine every day, in a test.
 
-    root : of the covariance of what these have of the heights, shape (m, k)
+    root : of the covariance of how much there is of each of these responses, shape (m, k)
     beyond : rms of what it does to the readings beyond these responses, shape (n, c)
     """
 

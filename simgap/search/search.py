@@ -17,7 +17,6 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import islice
 
 import numpy as np
 from simgap.fit.least_squares import LeastSquares
@@ -102,10 +101,8 @@ class Search:
     def _ranked(self) -> list[Hypothesis]:
         return self._evidence().ranked(list(self._found.values()))
 
-    def _make(self, wanted: Iterator[Move]) -> None:
-        # each has derivatives, which take memory until it is kept
-        while some := list(islice(wanted, self._options.finalists)):
-            self._keep(self._pool.map(lambda move: move(), some))
+    def _make(self, wanted: Iterable[Move]) -> None:
+        self._keep(self._pool.map(lambda move: move(), wanted))
 
     # -- the moves -----------------------------------------------------------------------------
 
@@ -298,10 +295,10 @@ class Search:
                        for h in self._ranked()[1:options.leading]
                        if h.effects and evidence(h) > evidence(best) - evidence.reach)
             good = [h.with_jacobian(self._problem) for h in self._ranked() if h.cost <= best.cost]
-            self._make(iter([
+            self._make([
                 *(partial(moves.dropped, self._problem, h, effect)
                   for h in good for effect in h.effects),
                 *(partial(moves.exchanged, self._problem, best, effect, effect, whole)
                   for effect, form in best.items if (whole := catalogue.whole(form)) is not form),
-                partial(moves.joined, self._problem, best)]))
+                partial(moves.joined, self._problem, best)])
         return Found(self._problem, self._ranked(), self._evidence())

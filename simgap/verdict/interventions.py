@@ -32,7 +32,7 @@ def _of_label(problem: LeastSquares, machine: ByLabel, none: Hypothesis, best: H
     groups = machine.labels.groups[key]
     numbers = _numbers(problem, machine, best, key) if best.effects else []
     common = _in_forms(problem, machine, best,
-                       [machine.labels.whole(form)[0] for form in best.forms])
+                       [machine.catalogue.whole(form) for form in best.forms])
     reach = held_out(
         problem, none, common, threads, groups,
         f'each value of {key} in turn, with the effect as the others have it; {FITTED}')
@@ -54,7 +54,7 @@ def _effects(numbers: Sequence[Mapping[str, Any]], differ: bool) -> list[str]:
 
 def _numbers(problem: LeastSquares, machine: ByLabel, best: Hypothesis,
              key: str) -> list[dict[str, Any]]:
-    bases = {effect: machine.labels.whole(form)[0] for effect, form in best.items}
+    bases = {effect: machine.catalogue.whole(form) for effect, form in best.items}
     chosen = {effect: machine.labels.split(form, key) for effect, form in bases.items()
               if can_be_split(form)}
     groups = machine.labels.groups[key]

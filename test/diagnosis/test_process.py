@@ -75,7 +75,7 @@ def test_a_linear_machine_is_moved_as_the_covariance_says() -> None:
     for apart in (TIME.size // 50, TIME.size // 10):
         assert np.diag(covariance, apart)[inner] == pytest.approx(
             np.diag(sampled, apart)[inner], abs=0.2 * float(said.max()) ** 2)
-    assert np.all(said[:, 1] < 1e-12)
+    assert not said[:, 1].any()
     assert np.all(found.beyond[inner, 0] < 0.2 * said[inner, 0])
 
 
@@ -111,7 +111,13 @@ def test_a_gap_in_a_recording_leaves_the_rest() -> None:
 def test_noise_beyond_the_sums_is_added_once() -> None:
     machine = with_everyday(calm_machine(Hunting))
     [one] = machine.experiments
-    assert np.median(one.noise[:, 0]) > 3.0 * np.median(one.noise[:, 1])
+    assert one.process is not None
+    patterns = (one.process.matrix(TIME.size) @ one.process.root).reshape(TIME.size, 2, -1)
+    whole = np.sqrt(one.noise ** 2 + (patterns ** 2).sum(axis=-1))
+    assert np.median(whole[:, 0]) > 10.0 * np.median(one.noise[:, 1])
+    # a twentieth of the variance is white
+    assert np.median(one.process.beyond[:, 0]) == pytest.approx(
+        np.median(whole[:, 0]) / np.sqrt(20.0), rel=0.1)
     again = machine.with_experiments([replace(one, colours=())])
     assert again.experiments[0].noise == pytest.approx(one.noise, rel=1e-9)
     bare = calm(one)
