@@ -25,7 +25,8 @@ from simgap.logs.channel import RecordingError
 
 NAME = 'recorder'
 OK, FAILED = 0, 1
-# How long a new run may take to send its configuration before a warning [s].
+# How long a new run may take to send its configuration before a warning, and before a bag may end
+# without it [s].
 _PATIENCE_S = 5.0
 _TIME = Entry('s', 0.0)
 
@@ -126,4 +127,5 @@ class _RecorderNode:
             self._ask_by = math.inf
             if not self._recorder.knows_configuration:
                 self._log.warning('not every node tells its parameters: the bag lacks them')
-        return self._stop.is_set()
+        return self._stop.is_set() and (
+            self._failed or self._ask_by == math.inf or self._recorder.knows_configuration)

@@ -224,7 +224,7 @@ def test_a_recorder_joins_a_running_drive_and_keeps_every_step(
         assert steps == list(range(steps[0], steps[-1] + 1)), topic
     recording = read_bag(tmp_path / 'run')
     assert recording.sheet.circuit == 'new'
-    assert set(recording.configuration) == set(UNITS)
+    assert set(recording.configuration) == set(UNITS), process.lines
     assert [(c.unit, dict(c.values)) for c in recording.changes] == [
         ('torque_share', {'bias_pot': 0.5})]
 
