@@ -142,7 +142,7 @@ def _physics() -> Iterator[Finding]:
     took = time.monotonic() - began
     yield Finding('physics', 'a run of 0.1 s', OK if finite else BROKEN,
                   f'{took:.1f} s' if finite else 'not finite',
-                  '' if finite else 'run antenna-drive accuracy and report what it says')
+                  '' if finite else 'report it with the versions above')
     from antenna_drive.physics.compiling import KEEPING
     folder = KEEPING.folder()
     if folder is None:

@@ -24,7 +24,6 @@ COMMANDS = {
     'configure': Command('configure', 'make a configuration of your own drive from its data '
                                       'sheets'),
     'article': Command('article', "repeat the article's experiments and compare the figures"),
-    'accuracy': Command('accuracy', 'measure how far a macro-step is from the converged run'),
     'record': Command('record', 'record a run of the five nodes'),
     'export': Command('export', 'turn a recording into CSV'),
     'import': Command('import_', 'turn a CSV from the field into a recording'),

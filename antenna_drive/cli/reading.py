@@ -5,9 +5,7 @@
 import argparse
 from collections.abc import Iterable
 import math
-from pathlib import Path
 
-from antenna_drive.recording.bam import read_bam
 from antenna_drive.recording.files import import_file, load_map, read_recording
 from antenna_drive.recording.recording import Recording
 from simgap.cli.diagnose import add_map_option
@@ -19,8 +17,8 @@ from simgap.logs.channel import Channel
 def add_recording_options(parser: argparse.ArgumentParser) -> None:
     """Add the recording to read, `--partial`, and `--from` and `--to` to read a part."""
     parser.add_argument('recording', metavar='RECORDING',
-                        help='a bag (folder or .mcap), a .csv, or a servo log (.json); with --map '
-                             'any file that docs/recording.md lists')
+                        help='a bag (folder or .mcap) or a .csv; with --map any file that '
+                             'docs/recording.md lists')
     add_map_option(parser)
     parser.add_argument('--partial', action='store_true',
                         help='take what can be read of a bag that was cut off, and say how far')
@@ -40,13 +38,8 @@ def refuse_none(name: object, channels: Iterable[Channel]) -> None:
 def read(args: argparse.Namespace) -> Recording:
     """Read the recording that the options name; UserError says what is wrong with it."""
     with reading():
-        # a servo's log belongs to its machine, which the room of recordings does not know
-        if args.map:
-            recording = import_file(args.recording, load_map(args.map))
-        elif Path(args.recording).suffix == '.json':
-            recording = read_bam(args.recording)
-        else:
-            recording = read_recording(args.recording, partial=args.partial)
+        recording = import_file(args.recording, load_map(args.map)) if args.map else (
+            read_recording(args.recording, partial=args.partial))
     if args.start > -math.inf or args.end < math.inf:
         recording = recording.between(args.start, args.end)
     refuse_none(args.recording, recording.channels.values())

@@ -58,6 +58,6 @@ def diagnose_recordings(recordings: Mapping[str, Recording], drive: Drive,
 
 def corrected(drive: Drive, verdict: Verdict) -> Corrected:
     """Return the configuration of a diagnosis of recordings, with what was found in it."""
-    machine = without_labels(verdict.machine)
+    machine, lawful = without_labels(verdict.machine), verdict.lawful
     assert isinstance(machine, AntennaMachine)
-    return correct(drive, machine.records, verdict.best)
+    return correct(drive, machine.records, lawful.hypothesis if lawful else verdict.best)

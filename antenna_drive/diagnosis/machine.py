@@ -20,6 +20,7 @@ from antenna_drive.diagnosis.disturbances import disturbances, disturbed, DriveD
 from antenna_drive.diagnosis.excitation import Longest
 from antenna_drive.diagnosis.field_test import FieldTest, Plans, prepared
 from antenna_drive.diagnosis.late_readings import Outputs, RipplingTachometer
+from antenna_drive.diagnosis.laws import learnable
 from antenna_drive.diagnosis.modifiers import KnownModifiers, RunSetup, SensorReadings
 from antenna_drive.diagnosis.sensors import digit_of
 from antenna_drive.diagnosis.tolerances import (
@@ -121,6 +122,9 @@ class AntennaMachine(Machine):
                                            for effect in effects.values()), self._modifiers))
         self.disturbance_inputs = tuple(disturbances(everyday_wind_torque(self._tests[0])))
         self.experiments = self._experiments({})
+        self.learnable = tuple(learnable(self._tests, drive))
+        self._modifiers.register(p for law in self.learnable
+                                 for p in law.effect.forms[0].parameters)
         self.planning = {'sheet': sheet_tree(_in_common([test.sheet for test in self._tests]))}
 
     @property

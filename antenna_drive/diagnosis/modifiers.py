@@ -167,6 +167,24 @@ class FieldChange(RunModifier):
 
 
 @dataclass(frozen=True)
+class Tabled(RunModifier):
+    """Adds to values of a learnt function, whose outer values are at the ends of a span."""
+
+    places: tuple[int, ...]  # of the values
+    span: tuple[float, float]
+    fields: tuple[str, ...]  # the functions
+
+    def apply(self, run: RunSetup, value: float) -> None:
+        for path in self.fields:
+            # angles count from where the run begins
+            first = run.start_angle if path.endswith('angle') else 0.0
+            for place in self.places:
+                run.change(f'{path}.{place}', ADD, value)
+            for end, x in enumerate(self.span):
+                run.change(f'{path}_span.{end}', SET, x - first)
+
+
+@dataclass(frozen=True)
 class SupplyGain(RunModifier):
     """Scales the voltages of the source of bias."""
 

@@ -14,7 +14,6 @@ from threading import Event
 import time
 from typing import Any
 
-from antenna_drive.diagnosis.tuned import loaded, tuned
 from antenna_drive.lockstep.entry import ros_node, stopped_by_signals
 from antenna_drive.lockstep.ros_parameters import Overrides
 from antenna_drive.lockstep.run_services import STATE_QOS
@@ -28,6 +27,7 @@ from antenna_drive.twin.baseline import Baseline
 from antenna_drive.twin.growing import GrowingVerdict, NextTest
 from antenna_drive.twin.regular_stamps import RegularSamples
 from antenna_drive.twin.topics import load_topics, own_topics, Topic, TopicMap
+from antenna_drive.twin.tuned import loaded, tuned
 from antenna_drive.twin.watch import Twin, TwinSettings
 from antenna_drive.workers import worker_processes
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus

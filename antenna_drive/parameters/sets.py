@@ -27,6 +27,14 @@ SHARE_STARTS = ('zero', 'steady')
 
 _PHASE = ('rad', -2.0 * math.pi, 2.0 * math.pi)
 
+# A learnt function has so many values, at even distances.
+LAW_PLACES = 12
+
+
+def _list(count: int, unit: str, description: str) -> Any:
+    """Declare the values of a learnt function, or the two places of its outer ones."""
+    return option((0.0,) * count, Entry(unit, -1e8, 1e8, description, lengths=(count, count)))
+
 
 @dataclass(frozen=True, kw_only=True)
 class RateCommand:
@@ -44,8 +52,7 @@ class Amplifier:
     rate_gain: float = given('article A/V', 1e-3, 1e3, 'proportional gain of amplifier 1 [k_r]')
     integral_time: float = given('s', 1e-3, 100.0, 'integral time of amplifier 1 [T_2]')
     lag: float = given('s', 1e-4, 10.0, 'lag behind amplifier 1 [T_a]')
-    current_feedback_gain: float = given(
-        'ohm', 0.0, 1e3, 'current feedback of amplifier 2 [G_a]')
+    current_feedback_gain: float = given('ohm', 0.0, 1e3, 'current feedback of amplifier 2 [G_a]')
     tach_gain: float = given('V s/rad', 1e-6, 10.0, 'volts per tachometer rate [k_t]')
     bias_command_gain: float = given(
         '1', 0.0, 10.0, 'share of the counter torque that reaches amplifier 1 [s_F]')
@@ -103,18 +110,21 @@ class Motor:
         2.0, '1', 0.1, 4.0, 'exponent of the rate in the fall of the Stribeck torque')
     friction_asymmetry: float = effect(
         0.0, '1', -0.9, 0.9, 'share by which forward friction exceeds the mean of both ways')
-    load_dependent_friction: float = effect(
-        0.0, '1', 0.0, 0.5, 'friction torque per gear torque')
+    load_dependent_friction: float = effect(0.0, '1', 0.0, 0.5, 'friction torque per gear torque')
     torque_ripple: float = effect(0.0, 'N m', 0.0, 20.0, 'amplitude of the torque ripple')
     torque_ripple_cycles: float = effect(
         12.0, '1', 0.1, 200.0, 'cycles of the torque ripple per motor revolution')
     torque_ripple_phase: float = effect(0.0, *_PHASE, 'phase of the torque ripple')
-    torque_ripple_second: float = effect(
-        0.0, 'N m', 0.0, 20.0, 'amplitude of the second harmonic of the torque ripple')
+    torque_ripple_second: float = effect(0.0, 'N m', 0.0, 20.0, 'amplitude of its second harmonic')
     torque_ripple_second_phase: float = effect(0.0, *_PHASE, 'phase of that harmonic')
-    torque_ripple_third: float = effect(
-        0.0, 'N m', 0.0, 20.0, 'amplitude of the third harmonic of the torque ripple')
+    torque_ripple_third: float = effect(0.0, 'N m', 0.0, 20.0, 'amplitude of its third harmonic')
     torque_ripple_third_phase: float = effect(0.0, *_PHASE, 'phase of that harmonic')
+    friction_by_rate: tuple[float, ...] = _list(LAW_PLACES, 'N m', 'further friction, by rate')
+    friction_by_rate_span: tuple[float, ...] = _list(2, 'rad/s', 'rates of its outer values')
+    friction_by_load: tuple[float, ...] = _list(LAW_PLACES, 'N m', 'the same, by gear torque')
+    friction_by_load_span: tuple[float, ...] = _list(2, 'N m', 'torques of its outer values')
+    torque_by_current: tuple[float, ...] = _list(LAW_PLACES, 'N m', 'further torque, by current')
+    torque_by_current_span: tuple[float, ...] = _list(2, 'article A', 'of its outer values')
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -123,23 +133,19 @@ class Gearbox:
 
     stiffness: float = given('N m/rad', 1e-3, 1e6, 'torsional stiffness [k_g]')
     half_gap: float = given('rad', 0.0, 10.0, 'half the backlash gap [b]')
-    contact_damping: float = given(
-        'N m s/rad', 0.0, 1e3, 'damping of the touching flanks [d_g]')
+    contact_damping: float = given('N m s/rad', 0.0, 1e3, 'damping of the touching flanks [d_g]')
     hysteresis: float = effect(0.0, 'N m', 0.0, 20.0, 'torque of the internal friction')
     hysteresis_share: float = effect(
         0.0, '1', 0.0, 0.9, 'internal friction as a share of the elastic torque')
     hysteresis_angle: float = effect(
         0.02, 'rad', 1e-4, 1.0, 'wind-up over which the internal friction builds up')
-    transmission_error: float = effect(
-        0.0, 'rad', 0.0, 1.0, 'amplitude of the transmission error')
+    transmission_error: float = effect(0.0, 'rad', 0.0, 1.0, 'amplitude of the transmission error')
     transmission_error_cycles: float = effect(
         1.0, '1', 0.001, 200.0, 'cycles of the transmission error per motor revolution')
     transmission_error_phase: float = effect(0.0, *_PHASE, 'phase of the transmission error')
-    transmission_error_second: float = effect(
-        0.0, 'rad', 0.0, 1.0, 'amplitude of the second harmonic of the transmission error')
+    transmission_error_second: float = effect(0.0, 'rad', 0.0, 1.0, 'its second harmonic')
     transmission_error_second_phase: float = effect(0.0, *_PHASE, 'phase of that harmonic')
-    transmission_error_third: float = effect(
-        0.0, 'rad', 0.0, 1.0, 'amplitude of the third harmonic of the transmission error')
+    transmission_error_third: float = effect(0.0, 'rad', 0.0, 1.0, 'its third harmonic')
     transmission_error_third_phase: float = effect(0.0, *_PHASE, 'phase of that harmonic')
 
 
@@ -152,11 +158,9 @@ class Tachometer:
     ripple: float = effect(0.0, '1', 0.0, 1.0, 'amplitude of the ripple, as a share of the rate')
     ripple_cycles: float = effect(1.0, '1', 0.1, 200.0, 'cycles of the ripple per revolution')
     ripple_phase: float = effect(0.0, *_PHASE, 'phase of the ripple')
-    ripple_second: float = effect(
-        0.0, '1', 0.0, 1.0, 'amplitude of the second harmonic of the ripple')
+    ripple_second: float = effect(0.0, '1', 0.0, 1.0, 'amplitude of its second harmonic')
     ripple_second_phase: float = effect(0.0, *_PHASE, 'phase of that harmonic')
-    ripple_third: float = effect(
-        0.0, '1', 0.0, 1.0, 'amplitude of the third harmonic of the ripple')
+    ripple_third: float = effect(0.0, '1', 0.0, 1.0, 'amplitude of its third harmonic')
     ripple_third_phase: float = effect(0.0, *_PHASE, 'phase of that harmonic')
 
 
@@ -210,8 +214,7 @@ class Axis:
     stiction_ratio: float = given('1', 1.0, 5.0, 'stiction over Coulomb friction, Eq. (4)')
     velocity_threshold: float = given(
         'rad/s', 0.0, 1e-3, 'rate below which friction can stop the axis [v_t]')
-    start_elevation: float = option(
-        math.pi / 4, Entry('rad', -0.2, 3.4, 'elevation at the start'))
+    start_elevation: float = option(math.pi / 4, Entry('rad', -0.2, 3.4, 'elevation at the start'))
     viscous_friction: float = effect(
         0.0, 'N m s/rad', 0.0, 1e10, 'friction torque per rate, at viscous_rate')
     viscous_rate: float = effect(
@@ -229,15 +232,17 @@ class Axis:
     friction_wave_cycles: float = effect(
         100.0, '1', 0.1, 1e5, 'cycles of that variation per turn of the axis')
     friction_wave_phase: float = effect(0.0, *_PHASE, 'phase of that variation')
-    friction_wave_second: float = effect(
-        0.0, '1', 0.0, 0.9, 'amplitude of the second harmonic of that variation')
+    friction_wave_second: float = effect(0.0, '1', 0.0, 0.9, 'amplitude of its second harmonic')
     friction_wave_second_phase: float = effect(0.0, *_PHASE, 'phase of that harmonic')
-    friction_wave_third: float = effect(
-        0.0, '1', 0.0, 0.9, 'amplitude of the third harmonic of that variation')
+    friction_wave_third: float = effect(0.0, '1', 0.0, 0.9, 'amplitude of its third harmonic')
     friction_wave_third_phase: float = effect(0.0, *_PHASE, 'phase of that harmonic')
     gravity_torque: float = effect(
         0.0, 'N m', -1e7, 1e7, 'imbalance: torque at zero elevation, pulling down')
     steady_wind_torque: float = effect(0.0, 'N m', -1e7, 1e7, 'torque of a steady wind')
+    friction_by_rate: tuple[float, ...] = _list(LAW_PLACES, 'N m', 'further friction, by rate')
+    friction_by_rate_span: tuple[float, ...] = _list(2, 'rad/s', 'rates of its outer values')
+    torque_by_angle: tuple[float, ...] = _list(LAW_PLACES, 'N m', 'further torque, by angle')
+    torque_by_angle_span: tuple[float, ...] = _list(2, 'rad', 'angles of its outer values')
 
     @property
     def mode_inertias_count(self) -> int:
@@ -255,11 +260,9 @@ class Encoder:
     cyclic_error_cycles: float = effect(
         4096.0, '1', 1.0, 1e6, 'cycles of the cyclic error per turn')
     cyclic_error_phase: float = effect(0.0, *_PHASE, 'phase of the cyclic error')
-    cyclic_error_second: float = effect(
-        0.0, 'rad', 0.0, 0.1, 'amplitude of the second harmonic of the cyclic error')
+    cyclic_error_second: float = effect(0.0, 'rad', 0.0, 0.1, 'amplitude of its second harmonic')
     cyclic_error_second_phase: float = effect(0.0, *_PHASE, 'phase of that harmonic')
-    cyclic_error_third: float = effect(
-        0.0, 'rad', 0.0, 0.1, 'amplitude of the third harmonic of the cyclic error')
+    cyclic_error_third: float = effect(0.0, 'rad', 0.0, 0.1, 'amplitude of its third harmonic')
     cyclic_error_third_phase: float = effect(0.0, *_PHASE, 'phase of that harmonic')
 
 

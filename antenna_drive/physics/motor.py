@@ -4,6 +4,7 @@
 
 from antenna_drive.parameters.sets import Ammeter, Motor, Tachometer
 from antenna_drive.physics.harmonics import wave, wave_slope
+from antenna_drive.physics.table import tabled
 from simgap.laws.compiling import inner
 from simgap.laws.friction import drag, slip_level
 
@@ -22,7 +23,7 @@ def driving_torque(current: float, angle: float, p: Motor) -> float:
         torque += wave(angle, p.torque_ripple, p.torque_ripple_second, p.torque_ripple_third,
                        p.torque_ripple_cycles, p.torque_ripple_phase,
                        p.torque_ripple_second_phase, p.torque_ripple_third_phase)
-    return torque
+    return torque + tabled(current, p.torque_by_current_span, p.torque_by_current)
 
 
 @inner
@@ -38,8 +39,10 @@ def friction_level(rate: float, gear_torque: float, p: Motor) -> float:
     if p.load_dependent_friction != 0.0:
         coulomb += p.load_dependent_friction * abs(gear_torque)
     dragging = drag(rate, p.viscous_friction, p.viscous_rate, p.flow_index)
-    return slip_level(rate, coulomb, dragging, p.stribeck_torque, p.stribeck_rate,
-                      p.stribeck_shape, p.friction_asymmetry)
+    level = slip_level(rate, coulomb, dragging, p.stribeck_torque, p.stribeck_rate,
+                       p.stribeck_shape, p.friction_asymmetry)
+    level += tabled(rate, p.friction_by_rate_span, p.friction_by_rate)
+    return max(0.0, level + tabled(gear_torque, p.friction_by_load_span, p.friction_by_load))
 
 
 @inner

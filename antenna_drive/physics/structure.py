@@ -15,6 +15,7 @@ from antenna_drive.parameters.sets import Axis, Encoder, Plant
 from antenna_drive.physics.arrays import FloatArray, IntArray
 from antenna_drive.physics.block import Block, Equation, held, output_rows, put, rest, rows, Signal
 from antenna_drive.physics.harmonics import wave
+from antenna_drive.physics.table import tabled
 from antenna_drive.physics.trigonometry import cosine
 from simgap.laws.compiling import inner, shared
 from simgap.laws.friction import drag, next_slip, slip_level
@@ -53,7 +54,7 @@ def _driving_torque(t: float, x: FloatArray, u: FloatArray, p: Axis) -> float:
     torque += held(u, INPUT.external_torque, t) + p.steady_wind_torque
     if p.gravity_torque != 0.0:
         torque -= p.gravity_torque * cosine(p.start_elevation + x[STATE.axis_angle])
-    return torque
+    return torque + tabled(x[STATE.axis_angle], p.torque_by_angle_span, p.torque_by_angle)
 
 
 @inner
@@ -76,8 +77,9 @@ def _friction_level(rate: float, angle: float, p: Axis) -> float:
             p.friction_wave_cycles, p.friction_wave_phase, p.friction_wave_second_phase,
             p.friction_wave_third_phase))
     dragging = drag(rate, p.viscous_friction, p.viscous_rate, p.flow_index)
-    return slip_level(rate, coulomb, dragging, p.stribeck_torque, p.stribeck_rate,
-                      p.stribeck_shape, 0.0)
+    level = slip_level(rate, coulomb, dragging, p.stribeck_torque, p.stribeck_rate,
+                       p.stribeck_shape, 0.0)
+    return max(0.0, level + tabled(rate, p.friction_by_rate_span, p.friction_by_rate))
 
 
 @inner

@@ -3,7 +3,7 @@
 """
 One recording of a drive: named signals, each with a unit and its own time stamps.
 
-A run of the emulator, a bag of the recorder node, a field test in a CSV and a servo's log are
+A run of the emulator, a bag of the recorder node and a field test in a CSV are
 all a `Recording`; article/, diagnosis/ and notebooks read nothing else. Signals are named
 'unit/signal' as in emulator/wiring.py. Nothing here can be changed after it was made; every
 operation gives a new recording.

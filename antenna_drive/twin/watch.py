@@ -10,7 +10,6 @@ stopped depends on the time that its owner gives to `advance`.
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from antenna_drive.diagnosis.tuned import loaded, Tuned
 from antenna_drive.emulator.run import MACRO_STEP
 from antenna_drive.emulator.unit import FloatArray
 from antenna_drive.parameters.sets import Drive
@@ -22,6 +21,7 @@ from antenna_drive.twin.intake import InputFaults, Intake
 from antenna_drive.twin.judge import BEHIND_S, BlockJudge, Course, Gap, Pending
 from antenna_drive.twin.quiet_record import learn, Track
 from antenna_drive.twin.shadow import Shadow, under_test
+from antenna_drive.twin.tuned import loaded, Tuned
 import numpy as np
 from simgap.errors import UserError
 from simgap.logs.channel import NANOSECONDS

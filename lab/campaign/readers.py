@@ -16,7 +16,6 @@ from antenna_drive.parameters.files import config_dir
 from antenna_drive.parameters.loading import load
 from antenna_drive.recording.bag_reader import read_bag
 from antenna_drive.recording.bag_writer import write_bag
-from antenna_drive.recording.bam import read_bam
 from antenna_drive.recording.csv_format import read_csv, write_csv
 from antenna_drive.recording.files import import_file, load_map
 from antenna_drive.recording.recording import Recording
@@ -65,11 +64,6 @@ SCORED = {
     'closed': 0.9}
 FIT_LOG = (b'{"problem": "0123", "settings": {}}\n'
            b'{"shares": [0.1, 0.2], "cost": 1.5, "figures": {"a": 1.0}, "complete": true}\n')
-SERVO_LOG = {
-    'mass': 0.5, 'length': 0.1, 'kp': 32, 'vin': 12.0, 'motor': 'sts', 'trajectory': 'sin',
-    'entries': [{'timestamp': 0.01 * k, 'goal_position': 0.1, 'position': 0.1, 'speed': 0.0,
-                 'load': 5, 'input_volts': 12.0, 'temp': 30, 'torque_enable': True}
-                for k in range(20)]}
 CHANGE = {'run': 5, 'step': 0, 'settings': {'bias_pot': 0.5, 'weights': [1.0, 2.0]}}
 
 
@@ -167,8 +161,6 @@ def reader(name: str, folder: Path) -> Reader:
             read_scored(path / 'cases.jsonl')))
     if name == 'fit_log':
         return Reader('fit.log', FIT_LOG, lambda path: read_log(path / 'fit.log'))
-    if name == 'servo_log':
-        return _json_reader('log.json', SERVO_LOG, lambda path: read_bam(path / 'log.json'))
     if name == 'change':
         return _json_reader('change.json', CHANGE, lambda path: read_record(
             (path / 'change.json').read_bytes().decode(errors='replace')))

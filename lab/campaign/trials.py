@@ -32,7 +32,7 @@ DOSES = (SHORT, MEDIUM, FULL)
 READERS = ('csv', 'bag', 'bag_part', 'bag_unchecked', 'bag_metadata', 'sheet', 'import_map',
            'import_csv', 'import_npy', 'import_npz', 'import_mat', 'import_json',
            'import_lines', 'import_parquet', 'configuration', 'targets', 'verdict',
-           'manifest', 'scored_cases', 'fit_log', 'servo_log', 'change', 'frame')
+           'manifest', 'scored_cases', 'fit_log', 'change', 'frame')
 CONDITIONS = ('full_disk', 'read_only_folder', 'removed_folder', 'full_disk_for_commands',
               'clock_set', 'suspended', 'many_drives', 'slow_observer', 'many_changes',
               'second_publishers', 'stopped_beside_garbage', 'stopped_while_others_join')

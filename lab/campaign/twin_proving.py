@@ -10,7 +10,6 @@ is what it would have said in real time.
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from antenna_drive.diagnosis.tuned import tuned
 from antenna_drive.emulator.unit import FloatArray
 from antenna_drive.parameters.loading import load
 from antenna_drive.readings import FIELD_COLUMNS
@@ -18,6 +17,7 @@ from antenna_drive.recording.recording import Recording, unit_of
 from antenna_drive.recording.sheet import parse_sheet
 from antenna_drive.twin.growing import diagnosed, look_of
 from antenna_drive.twin.sequential import decided, Look, Rule
+from antenna_drive.twin.tuned import tuned
 from antenna_drive.twin.watch import GAP, Twin, TwinSettings
 import numpy as np
 from simgap.logs.channel import make_channel, NANOSECONDS

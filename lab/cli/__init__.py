@@ -21,6 +21,7 @@ COMMANDS = {
     'servo': Command('servo', 'say what the model of an ordinary servo lacks'),
     'calibrate': Command('calibrate', 'fit parameters to the published figures'),
     'bench': Command('bench', 'measure speed'),
+    'accuracy': Command('accuracy', 'measure how far a macro-step is from the converged run'),
     'campaign': Command('campaign', 'look for faults: kills, garbage, damaged files, full disks'),
 }
 

@@ -21,7 +21,6 @@ import argparse
 from pathlib import Path
 
 from antenna_drive.cli.options import add_worker_options
-from antenna_drive.recording.bam import read_bam
 from simgap.command.output import add_json_option, check_options, give, Progress
 from simgap.errors import UserError
 from simgap.inputs.schema import Entry
@@ -47,7 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Compare; 0 if the diagnosis has the lower withheld error in every split, else 1."""
     # the compiled physics loads slowly, so it is imported only here
-    from lab.servo.log import ServoLog
+    from lab.servo.log import read_bam, ServoLog
     from lab.servo.rounds import FitEffort
     from lab.servo.study import directions, SPLITS, study, text
 

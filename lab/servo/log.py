@@ -8,17 +8,42 @@ from dataclasses import dataclass
 import math
 from pathlib import Path
 
+from antenna_drive.recording.files import import_file, parse_map
 from antenna_drive.recording.recording import Recording
 from lab.servo.firmware import Firmware, firmware_of
 from lab.servo.physics import swing
 import numpy as np
 from simgap.errors import UserError
+from simgap.inputs.plain import from_json
+from simgap.logs.text import read_text
 from simgap.machine.contract import FloatArray
 
 CHANNELS = ('position', 'speed', 'duty')
 UNITS = ('rad', 'rad/s', '1')
 POSITION, SPEED, DUTY = range(3)
 STEP_S = 2.8e-3
+# What a log of the BAM project (Rhoban) has of each sample. The load is a register of 16 bits.
+_MAP = parse_map({'time': {'column': 'timestamp'}, 'signals': {
+    f'servo/{name}': {'column': name, 'unit': unit} for name, unit in {
+        'goal_position': 'rad', 'position': 'rad', 'speed': 'rad/s', 'load': '1',
+        'input_volts': 'V', 'temp': '1', 'torque_enable': '1'}.items()}})
+_NOTES = {'mass': (int, float), 'length': (int, float), 'kp': (int, float), 'vin': (int, float),
+          'motor': (str,), 'trajectory': (str,)}
+
+
+def read_bam(path: Path) -> Recording:
+    """
+    Return a log of the BAM project, with mass [kg], length [m], kp, vin [V], motor and trajectory.
+
+    Raises RecordingError: it cannot be read. Raises UserError: one of these is missing.
+    """
+    recording, above = import_file(path, _MAP), from_json(read_text(path))
+    for name, kinds in _NOTES.items():
+        if not isinstance(above.get(name), kinds) or isinstance(above[name], bool):
+            raise UserError(f'{path}: {name}: {above.get(name)!r} given, allowed is a '
+                            f'{"text" if str in kinds else "number"}')
+    return Recording(recording.channels, notes={
+        **recording.notes, **{name: above[name] for name in _NOTES}})
 
 
 @dataclass(frozen=True)
@@ -42,7 +67,7 @@ class ServoLog:
     @classmethod
     def of(cls, name: str, recording: Recording, beside: Path | None = None) -> ServoLog:
         """
-        Prepare a log that `bam.read_bam` has read; see `firmware_of` for `beside`.
+        Prepare a log that `read_bam` has read; see `firmware_of` for `beside`.
 
         Raise UserError where it is too short, or the drive law of this servo is not known.
         """
@@ -59,14 +84,14 @@ class ServoLog:
             raise UserError(f'{name}: {time.size} samples, at least 50 are needed')
         values = {key: np.array(recording[f'servo/{key}'].values, dtype=np.float64)
                   for key in ('position', 'speed', 'goal_position', 'torque_enable',
-                              'temperature', 'load')}
+                              'temp', 'load')}
         load = values['load']
         # the register has 16 bits in two's complement
         duty = np.where(load >= 2 ** 15, load - 2 ** 16, load) / firmware.duty_count
         return cls(name, float(notes['kp']), str(notes['trajectory']), float(notes['mass']),
                    float(notes['length']), float(notes['kp']) * firmware.error_gain,
                    float(notes['vin']), firmware, time, values['goal_position'],
-                   values['torque_enable'], values['temperature'],
+                   values['torque_enable'], values['temp'],
                    np.column_stack([values['position'], values['speed'], duty]))
 
     @property

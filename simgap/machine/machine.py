@@ -42,6 +42,16 @@ class DisturbanceInput:
     everyday: float = 0.0  # rms of what acts there every day, in units of a course
 
 
+@dataclass(frozen=True)
+class Learnable:
+    """A function that the machine's own equations have room for."""
+
+    effect: Effect  # of one form, whose numbers are its values
+    by: str  # the quantity that it depends on
+    by_unit: str
+    at: tuple[float, ...]  # values of the quantity
+
+
 class Machine(ABC):
     """
     A machine that can be simulated, and the experiments that were made with it.
@@ -49,6 +59,7 @@ class Machine(ABC):
     nuisances : numbers known only within a tolerance, fitted beside any effect
     catalogue : the effects that the model may lack, by id
     disturbance_inputs : where an unknown input may act; readings need not be listed
+    learnable : functions that its equations have room for, which no effect of the catalogue is
     notes : what the machine inferred or missed, for people
     diagram : picture of the machine for the page; None for a block for each component
     advice : tests that settle what is open: effects without their component (empty for any), and
@@ -61,6 +72,7 @@ class Machine(ABC):
     nuisances: Nuisances
     catalogue: Catalogue
     disturbance_inputs: Sequence[DisturbanceInput] = ()
+    learnable: Sequence[Learnable] = ()
     notes: Sequence[str] = ()
     diagram: Diagram | None = None
     advice: Sequence[tuple[Sequence[str], str]] = ()
@@ -170,9 +182,9 @@ class Wrapped(Machine):
                  catalogue: Catalogue) -> None:
         super().__init__(experiments, nuisances, catalogue)
         self.inner = inner
-        self.disturbance_inputs, self.notes = inner.disturbance_inputs, inner.notes
+        self.disturbance_inputs, self.learnable = inner.disturbance_inputs, inner.learnable
         self.diagram, self.advice, self.words = inner.diagram, inner.advice, inner.words
-        self.planning = inner.planning
+        self.notes, self.planning = inner.notes, inner.planning
 
     @abstractmethod
     def around(self, inner: Machine) -> Machine:

@@ -47,15 +47,16 @@ class Law:
     # share of what is left of each test that it takes, fitted to the others; None for one test
     withheld: float | None = None
     orders: tuple[int, ...] = ()  # the waves of a turn that it is a sum of; empty for any function
+    walks: bool = False  # whether its numbers are steps from place to place, see `walk`
 
     def __str__(self) -> str:
         return self.by + (f', in proportion to {self.times}' if self.times else '')
 
     @property
     def shapes(self) -> FloatArray:
-        """Return what its m numbers do at its k places, shape (k, m): hats, or waves of a turn."""
+        """Return what its m numbers do at its k places, shape (k, m): hats, steps, or waves."""
         if not self.orders:
-            return np.eye(len(self.at))
+            return walk(len(self.at)) if self.walks else np.eye(len(self.at))
         turn = np.outer(np.array(self.at) * 2.0 * math.pi / self.at[-1], self.orders)
         return np.hstack([np.cos(turn), np.sin(turn)])
 
@@ -100,6 +101,15 @@ class Law:
             values, at.min(), at.max())[:, np.newaxis] - at) / self.width)
             for factor, values in zip(factors, quantities[self.by].values, strict=True)]
         return [own @ self.shapes for own in hats] if self.orders else hats
+
+
+def walk(places: int) -> FloatArray:
+    """Return what a level in the middle and steps outwards do at each place, shape (n, n)."""
+    # so that a place which no data tell of is as the nearest one of which they do
+    middle, index = places // 2, np.arange(places)
+    at, step = index[:, np.newaxis], index
+    return np.where(step >= middle, at >= step, at <= step) * 1.0 + (
+        (step == middle) & (at < middle))
 
 
 class WithLaw(Wrapped):

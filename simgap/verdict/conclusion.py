@@ -49,7 +49,8 @@ def concluded(machine: Machine, progress: Callable[[float, str], None], threads:
     machine = found.problem.machine.truncated()
     stated = with_noise_left(machine, point, settings.noise, 1.0)
     judged = LeastSquares(stated, settings=settings)
-    places = unknown_input.places(judged, point, judged.as_stated())
+    places = unknown_input.places(
+        judged, point, None if machine.learnable else judged.as_stated())
     law = lawful_fit(found, places, threads)
     decision = verdict.decide(found, places, law.gained if law else -math.inf,
                               enough(found.problem))

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from simgap.fit.least_squares import LeastSquares
 from simgap.fit.noise import with_model_error, with_noise_left
-from simgap.machine.contract import FloatArray
+from simgap.machine.contract import Machine
 from simgap.machine.with_law import Law, WithLaw
 from simgap.search import moves
 from simgap.search.evidence import Evidence
@@ -25,6 +25,7 @@ from simgap.settings import IntervalSettings
 from simgap.verdict.held_out import held_out
 from simgap.verdict.intervals import covariance
 from simgap.verdict.law import predicted, quantities_of, REACHED
+from simgap.verdict.learning import learnt
 from simgap.verdict.unknown_input import Place, readings_of
 
 # A law moves the machine, and so what it is a function of.
@@ -40,23 +41,17 @@ class LawfulFit:
     # an error of form may do
     gained: float
     law: Law  # with all its places, as it was begun with
-    machine: WithLaw
+    machine: Machine
     hypothesis: Hypothesis  # the best one with the law, whose values are those of its last form
 
 
 def lawful_fit(found: Found, places: Sequence[Place], threads: int = 1) -> LawfulFit | None:
     """Return the likeliest law of all places, in the fit; None if none promises its price."""
-    place = max((place for place in places if place.law),
-                key=lambda place: place.law.evidence if place.law else 0.0, default=None)
-    if place is None or place.law is None or (
-            place.law.evidence < found.evidence.price([place.law.as_form()])):
+    settings = found.problem.settings
+    begun = learnt(found) if found.problem.machine.learnable else _entering(found, places)
+    if begun is None:
         return None
-    base, problem = found.best, found.problem.as_stated()
-    level = problem.noise_level(problem.residuals(base.state.point()))
-    problem = problem.at_noise(level)
-    begun = replace(base, state=problem.start(base.state.parameters, base.state.point()))
-    machine, law = _added(problem, begun, place, place.law)
-    settings = problem.settings
+    machine, place, law = begun
     # all are compared at the noise that the law leaves, with the error that every model has
     left = with_noise_left(machine, law.state.point(), settings.noise,
                            settings.noise.greatest_level)
@@ -65,49 +60,61 @@ def lawful_fit(found: Found, places: Sequence[Place], threads: int = 1) -> Lawfu
     law = replace(law, state=problem.fit(problem.start(
         law.state.parameters, law.state.point()), settings.search.iterations))
     slopes = law.state.jacobian[:, :len(problem.machine.nuisances)]
-    rivals = [moves.refitted(problem, h, law, slopes)
-              for h in ([base, found.none] if base.effects else [base])]
+    rivals = [moves.refitted(problem, h, law, slopes) for h in (
+        [found.best, found.none] if found.best.effects else [found.best])]
     evidence = Evidence.among(problem, [law, *rivals])
     rival = max(rivals, key=evidence)
     gained = evidence(law) - evidence(rival) - found.evidence.reach
     withheld = None
     if gained > 0.0:
         withheld = held_out(problem, rivals[-1], law, threads)['explained_fraction']['value']
+    assert place.law is not None
     return LawfulFit(replace(
         place, evidence=place.law.evidence, explained=max(1.0 - law.cost / rival.cost, 0.0),
-        law=_as_fitted(place.law, law, machine.reached, gained, withheld,
-                       settings.interval)), gained, place.law, machine, law)
+        law=_as_fitted(place.law, law, machine, gained, withheld, settings.interval)),
+        gained, place.law, machine, law)
 
 
-def _added(problem: LeastSquares, base: Hypothesis, place: Place,
-           law: Law) -> tuple[WithLaw, Hypothesis]:
-    """Return a machine that knows a law, and a hypothesis with it beside what another has."""
+def _entering(found: Found, places: Sequence[Place]) -> tuple[WithLaw, Place, Hypothesis] | None:
+    """Return the likeliest law of an input, beside the best hypothesis; None if none pays."""
+    place = max((place for place in places if place.law),
+                key=lambda place: place.law.evidence if place.law else 0.0, default=None)
+    if place is None or place.law is None or (
+            place.law.evidence < found.evidence.price([place.law.as_form()])):
+        return None
+    problem, law = found.problem.as_stated(), place.law
+    point = found.best.state.point()
+    problem = problem.at_noise(problem.noise_level(problem.residuals(point)))
     source = next(item for item in (*problem.machine.disturbance_inputs, *readings_of(problem))
                   if item.name == place.name)
-    effect, lawful, state = law.as_effect(source), problem, base.state
-    form = effect.forms[0]
-    numbers, point = form.parameters, {**state.point(), **form.start}
+    effect = law.as_effect(source)
+    form, lawful, state = effect.forms[0], problem, problem.start(
+        found.best.state.parameters, point)
+    begun, point = state, {**point, **form.start}
     for _ in range(_ROUNDS):
         machine = WithLaw(problem.machine, effect, source, [
             own / source.size for own in law.weights(quantities_of(
                 lawful.machine, predicted(lawful.machine, state.point())))])
         lawful = problem.of(machine, problem.scale)
         # one-sided: each difference runs all tests
-        columns = lawful.jacobian(point, numbers, lawful.residuals(point), central=False)
+        columns = lawful.jacobian(point, form.parameters, lawful.residuals(point), central=False)
         state = lawful.fit(lawful.start(
-            (*base.state.parameters, *numbers), point,
-            np.column_stack([base.state.jacobian, columns])), problem.settings.search.iterations)
+            (*begun.parameters, *form.parameters), point,
+            np.column_stack([begun.jacobian, columns])), problem.settings.search.iterations)
         point = state.point()
-    return machine, Hypothesis((*base.effects, effect.id), (*base.forms, form), state)
+    return machine, place, Hypothesis(
+        (*found.best.effects, effect.id), (*found.best.forms, form), state)
 
 
-def _as_fitted(law: Law, found: Hypothesis, reached: FloatArray, gained: float,
+def _as_fitted(law: Law, found: Hypothesis, machine: Machine, gained: float,
                withheld: float | None, settings: IntervalSettings) -> Law:
     """Return a law as it was fitted, where the motion that it makes has reached it."""
     state, shapes = found.state, law.shapes
     own = np.flatnonzero([p in found.forms[-1].parameters for p in state.parameters])
     known = covariance(state, 1.0, settings)[np.ix_(own, own)]
     values, spread = shapes @ state.x[own], np.sqrt(np.sum((shapes @ known) * shapes, axis=1))
+    reached = machine.reached if isinstance(machine, WithLaw) else (
+        np.abs(state.base_jacobian[:, own]).max(axis=0))
     there = np.ones(len(values), bool) if law.orders else reached > REACHED * reached.max()
     return replace(law, evidence=gained, at=tuple(np.array(law.at)[there].tolist()),
                    values=tuple(values[there].tolist()),

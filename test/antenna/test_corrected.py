@@ -51,7 +51,7 @@ def machine(tests: dict[str, Recording]) -> AntennaMachine:
 def hypothesis(machine: AntennaMachine, point: dict[str, float]) -> Hypothesis:
     """Return the fitted effects and nuisances that have these values."""
     forms: dict[str, Form] = {}
-    for effect in machine.catalogue.values():
+    for effect in (*machine.catalogue.values(), *(law.effect for law in machine.learnable)):
         for form in effect.forms:
             at = machine.catalogue.wave_at(form, 12.0) if isinstance(form, Wave) else form
             if effect.id not in forms and any(p.name in point for p in at.sizes):
@@ -80,6 +80,9 @@ def loaded(made: Corrected, folder: Path) -> Drive:
     {'current_1.gain.change': 0.1, 'current_2.offset.offset': 0.2},
     {'encoder.cyclic_error.sine@12': 1e-4, 'encoder.cyclic_error.second_cosine@12': 4e-5},
     {'axis.stribeck_friction.torque': 5e4, 'tach_1.offset.offset': 0.3},
+    {'axis.friction_by_rate.6': 2e4, 'axis.friction_by_rate.8': 3e4},
+    {'motors.friction_by_load.6': 0.2, 'motors.friction_by_load.3': 0.1},
+    {'motor_2.torque_by_current.9': 0.3, 'axis.torque_by_angle.2': 2e4},
 ], ids=lambda effect: next(iter(effect)))
 def test_the_file_moves_as_the_fitted_model(
         effect: dict[str, float], machine: AntennaMachine, tests: dict[str, Recording],

@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The lock-step at 1 ms against the converged reference, and against the published limit."""
 
-from antenna_drive.article.accuracy import distances
 from antenna_drive.article.stability import growth_rate, simulated_limit
 from antenna_drive.parameters import load
+from lab.bench.accuracy import distances
 import pytest
 
 OLD_POLE = 1.369863

@@ -4,13 +4,18 @@
 
 from dataclasses import replace
 import math
+from operator import attrgetter
+from typing import Any
 
+from antenna_drive.emulator.run import simulate
 from antenna_drive.parameters import load
 from antenna_drive.parameters.records import record_of
+from antenna_drive.parameters.sets import changed, LAW_PLACES
 from antenna_drive.physics.amplifier import armature_voltage
 from antenna_drive.physics.armature import current_rate
 from antenna_drive.physics.gearbox import gear_torque, presliding_rate
 from antenna_drive.physics.harmonics import wave, wave_slope
+from antenna_drive.physics.table import tabled
 from hypothesis import given
 from hypothesis import strategies as st
 import numpy as np
@@ -89,3 +94,41 @@ def test_hysteresis_as_a_share_of_the_load_grows_with_the_load() -> None:
     # the state comes to rest where the teeth have moved far enough one way
     assert presliding_rate(1, 0.3, 1.0, worn) == 0.0
     assert presliding_rate(1, 0.3, 0.0, worn) == pytest.approx(0.3 / 0.02)
+
+
+@given(st.floats(-2.0, 5.0), st.lists(ANGLES, min_size=2, max_size=12))
+def test_a_table_is_straight_between_its_values_and_level_beyond(
+        x: float, values: list[float]) -> None:
+    table = np.array(values)
+    expected = np.interp(x, np.linspace(-1.0, 3.0, table.size), table)
+    assert tabled(x, np.array([-1.0, 3.0]), table) == pytest.approx(expected, abs=1e-9)
+    assert tabled(x, np.zeros(2), table) == 0.0
+
+
+@pytest.mark.parametrize(('path', 'values', 'span', 'known', 'change'), [
+    ('motor_1.motor.friction_by_rate', 2.0, 60.0, 'motor_1.motor.coulomb_torque', 2.0),
+    ('motor_1.motor.friction_by_load', 2.0, 60.0, 'motor_1.motor.coulomb_torque', 2.0),
+    ('motor_1.motor.torque_by_current', (-6.0, 6.0), 10.0, 'motor_1.motor.torque_constant', 0.6),
+    ('plant.axis.friction_by_rate', 3e5, 0.01, 'plant.axis.coulomb_torque', 3e5),
+    ('plant.axis.torque_by_angle', 3e5, 0.1, 'plant.axis.steady_wind_torque', 3e5),
+])
+def test_a_learnt_function_does_what_the_effect_does_that_it_is(
+        path: str, values: float | tuple[float, float], span: float, known: str,
+        change: float) -> None:
+    drive = changed(load('new_circuit'), {
+        'test_signal.rate.waveform': 'square', 'test_signal.rate.amplitude': 0.002,
+        'test_signal.rate.period': 2.0})
+    owner, _, name = known.rpartition('.')
+    part: Any = attrgetter(owner)(drive)
+    per = part.friction_torque_per_ampere * getattr(part, 'gear_ratio', 1.0)
+    named = {known: getattr(part, name) + change / (per if name == 'coulomb_torque' else 1.0)}
+    first, last = np.broadcast_to(values, 2)
+    table = np.linspace(first, last, LAW_PLACES)
+    learnt = changed(drive, {
+        path: tuple(table.tolist()), f'{path}_span': (-span, span)})
+    healthy, want, found = (simulate(item, 3.0) for item in (
+        drive, changed(drive, named), learnt))
+    for name in ('motor_1/ammeter', 'plant/encoder'):
+        moved = np.abs(want[name] - healthy[name]).max()
+        assert moved > 0.0
+        np.testing.assert_allclose(found[name], want[name], atol=1e-6 * moved, rtol=0.0)

@@ -7,9 +7,8 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from antenna_drive.recording.bam import read_bam
 from lab.servo.firmware import Firmware, firmware_of
-from lab.servo.log import DUTY, ServoLog
+from lab.servo.log import DUTY, read_bam, ServoLog
 import numpy as np
 import pytest
 from simgap.errors import UserError

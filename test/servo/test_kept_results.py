@@ -6,8 +6,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from antenna_drive.recording.bam import read_bam
-from lab.servo.log import ServoLog
+from lab.servo.log import read_bam, ServoLog
 from lab.servo.rounds import FitEffort
 from lab.servo.study import _KeptResults, Direction
 import numpy as np

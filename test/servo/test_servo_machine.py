@@ -14,12 +14,11 @@ import json
 import math
 from pathlib import Path
 
-from antenna_drive.recording.bam import read_bam
 from lab import cli
 from lab.servo import refit as servo_refit
 from lab.servo.catalogue import BASE, catalogue, number, NUMBERS, TIED, vector
 from lab.servo.firmware import firmware_of
-from lab.servo.log import ServoLog
+from lab.servo.log import read_bam, ServoLog
 from lab.servo.machine import ServoMachine
 from lab.servo.physics import GRAVITY, ORDER
 from lab.servo.ranking import rank_hypotheses

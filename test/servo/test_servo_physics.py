@@ -8,9 +8,8 @@ import math
 from pathlib import Path
 from typing import Any
 
-from antenna_drive.recording.bam import read_bam
 from lab.servo.catalogue import catalogue, vector
-from lab.servo.log import ServoLog
+from lab.servo.log import read_bam, ServoLog
 from lab.servo.physics import GRAVITY, swing
 from lab.servo.refit import error, LADDER
 import numpy as np

@@ -8,12 +8,12 @@ from dataclasses import replace
 from functools import cache
 from typing import Any
 
-from antenna_drive.diagnosis.tuned import tuned
 from antenna_drive.parameters.loading import load
 from antenna_drive.readings import FIELD_COLUMNS
 from antenna_drive.recording.sheet import parse_sheet
 from antenna_drive.twin import watch
 from antenna_drive.twin.baseline import Baseline
+from antenna_drive.twin.tuned import tuned
 from antenna_drive.twin.watch import Twin, TwinSettings
 from lab.antenna.effects import CATALOGUE
 from lab.campaign.twin_proving import played

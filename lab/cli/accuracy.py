@@ -24,11 +24,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    from antenna_drive.article.accuracy import distances
     from antenna_drive.article.experiments import experiments
     from antenna_drive.article.stability import simulated_limit
     from antenna_drive.emulator.run import FINE_STEP
     from antenna_drive.parameters import load
+    from lab.bench.accuracy import distances
     from simgap.errors import UserError
 
     steps = args.step or list(_DEFAULT_STEPS)

@@ -1,0 +1,55 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""The functions that the drive's equations have room for, over what the tests have reached."""
+
+from collections.abc import Iterator, Sequence
+
+from antenna_drive.diagnosis.catalogue import MOTORS
+from antenna_drive.diagnosis.field_test import FieldTest
+from antenna_drive.diagnosis.modifiers import AntennaParameter, Tabled
+from antenna_drive.parameters.sets import Drive, LAW_PLACES
+from antenna_drive.readings import AT
+import numpy as np
+from simgap.machine.contract import Effect, Form, Learnable
+from simgap.machine.with_law import walk
+
+# Outliers of a reading have not been reached: what is left out at each end.
+_ENDS = (0.002, 0.998)
+# Of a motor: the function, what it depends on with its unit, the readings that tell it.
+_OF_A_MOTOR = (('friction_by_rate', 'rate', 'rad/s', 'tach'),
+               ('friction_by_load', 'gear torque', 'N m', 'current'),
+               ('torque_by_current', 'current', 'article A', 'current'))
+# What moves the drive a little, of a motor and of the axis [N m].
+_OF_MOTOR, _OF_AXIS = 0.05, 2e3
+
+
+def learnable(tests: Sequence[FieldTest], drive: Drive) -> Iterator[Learnable]:
+    """Yield the functions, of one motor, of both alike, and of the axis."""
+    def reached(reading: str, per: float = 1.0, turned: float = 0.0) -> list[float]:
+        seen = [test.measured[:, AT[reading]] + turned * test.start_angle for test in tests]
+        return (per * np.nanquantile(np.concatenate(seen), _ENDS)).tolist()
+
+    for component, motors in MOTORS.items():
+        for function, by, unit, reading in _OF_A_MOTOR:
+            per = drive.motor_1.motor.torque_constant if by == 'gear torque' else 1.0
+            spans = [reached(f'{reading}_{motor[-1]}', per) for motor in motors]
+            yield _law(component, f'of {component}'.replace('_', ' '), function, by, unit, (
+                min(low for low, _ in spans), max(high for _, high in spans)), [
+                    f'{motor}.motor.{function}' for motor in motors])
+    yield _law('axis', 'of the axis', 'friction_by_rate', 'rate', 'rad/s', reached(
+        'tach_1', 1.0 / drive.plant.axis.gear_ratio), ['plant.axis.friction_by_rate'])
+    yield _law('axis', 'on the axis', 'torque_by_angle', 'angle', 'rad', reached(
+        'encoder', turned=1.0), ['plant.axis.torque_by_angle'])
+
+
+def _law(component: str, whose: str, function: str, by: str, unit: str, span: Sequence[float],
+         paths: Sequence[str]) -> Learnable:
+    key, (low, high) = f'{component}.{function}', span
+    return Learnable(
+        Effect(key, component, f'{function.partition("_")[0]} {whose}', (Form(by, tuple(
+            AntennaParameter(f'{key}.{k}', 'N m', -1e8, 1e8,
+                             _OF_AXIS if component == 'axis' else _OF_MOTOR,
+                             modifier=Tabled(tuple(np.flatnonzero(step)), (low, high),
+                                             tuple(paths)))
+            for k, step in enumerate(walk(LAW_PLACES).T)), scanned=True),)),
+        by, unit, tuple(np.linspace(low, high, LAW_PLACES).tolist()))
