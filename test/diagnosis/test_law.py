@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from simgap.fit.least_squares import LeastSquares
 from simgap.machine.contract import (
-    Course, DisturbanceInput, Experiment, FloatArray, Machine, Motion, Parameter, Point,
-    TimeScales,
+    Course, DisturbanceInput, Effect, Experiment, FloatArray, Form, Learnable, Machine, Motion,
+    Parameter, Point, TimeScales,
 )
-from simgap.machine.with_law import Law
+from simgap.machine.with_law import Law, walk
 from simgap.search.evidence import Evidence, temperature
 from simgap.search.hypothesis import Hypothesis
 from simgap.search.search import Found
@@ -82,13 +82,28 @@ class Swing(Machine):
                 + point.get('zero', 0.0) for course in courses]
 
 
+class Learns(Swing):
+    """The same, whose own equations have room for a spring."""
+
+    at = np.linspace(-0.8, 0.8, 9)
+    numbers = tuple(Parameter(f'mass.spring.{k}', 'N', -50.0, 50.0, 0.05) for k in range(9))
+    learnable = (Learnable(Effect('mass.spring', 'mass', 'spring of the mass', (
+        Form('angle', numbers, scanned=True),)), 'angle', 'rad', tuple(at.tolist())),)
+
+    def predict(self, point: Point, experiment: int) -> FloatArray:
+        """Return the angle."""
+        force = walk(9) @ [point.get(p.name, 0.0) for p in self.numbers]
+        return self._moved(lambda angle: float(np.interp(angle, self.at, force)), NOTHING)[
+            :, np.newaxis] + point.get('zero', 0.0)
+
+
 def lawful(machine: Machine, named: float = 0.0) -> LawfulFit:
     """Return the likeliest law in the fit of a machine, whose named effects gain so much."""
     problem = LeastSquares(machine)
     none = Hypothesis((), (), problem.fit(problem.start(machine.nuisances, {}), 5))
     evidence = replace(Evidence.among(problem, [none]), gain=named)
-    fit = lawful_fit(Found(problem, [none], evidence),
-                     places(problem, none.state.point(), problem))
+    fit = lawful_fit(Found(problem, [none], evidence), [] if machine.learnable else places(
+        problem, none.state.point(), problem))
     assert fit is not None
     return fit
 
@@ -171,6 +186,23 @@ def test_a_law_acts_in_the_simulation() -> None:
     assert at.size > 8 and np.abs(at).max() < 0.7
     often = np.abs(at) < 0.55
     np.testing.assert_allclose(values[often], force[often], atol=0.1 * np.abs(force).max())
+
+
+def test_a_law_that_the_equations_have_room_for_is_learnt_within_them() -> None:
+    """The curve is the force's where the mass has been, and level beyond; noise teaches none."""
+    fit = lawful(Learns(lambda angle: -4.0 * angle ** 3))
+    law = fit.place.law
+    assert fit.gained > 1000.0 and law is not None
+    assert (fit.place.name, fit.place.component, law.by) == ('spring of the mass', 'mass', 'angle')
+    at = np.array(law.at)
+    assert at.size >= 7
+    np.testing.assert_allclose(law.values, -4.0 * at ** 3, atol=0.1 * 4.0 * 0.6 ** 3)
+    # fitted, the machine leaves the noise of its sensor
+    left = fit.machine.experiments[0].measured - fit.machine.predict(
+        fit.hypothesis.state.point(), 0)
+    assert float(np.sqrt(np.mean(left ** 2))) == pytest.approx(0.005, rel=0.05)
+    with pytest.raises(AssertionError):
+        lawful(Learns(lambda angle: 0.0))
 
 
 def test_a_law_has_the_units_of_its_place_and_deviations_that_hold() -> None:
