@@ -10,10 +10,10 @@ from antenna_drive.diagnosis.modifiers import AntennaParameter, Tabled
 from antenna_drive.parameters.sets import Drive, LAW_PLACES
 from antenna_drive.readings import AT
 import numpy as np
-from simgap.machine.contract import Effect, Form, Learnable
+from simgap.machine.contract import Effect, FloatArray, Form, Learnable
 from simgap.machine.with_law import walk
 
-# Outliers of a reading have not been reached: what is left out at each end.
+# An outlier of a reading has not been reached.
 _ENDS = (0.002, 0.998)
 # Of a motor: the function, what it depends on with its unit, the readings that tell it.
 _OF_A_MOTOR = (('friction_by_rate', 'rate', 'rad/s', 'tach'),
@@ -23,33 +23,40 @@ _OF_A_MOTOR = (('friction_by_rate', 'rate', 'rad/s', 'tach'),
 _OF_MOTOR, _OF_AXIS = 0.05, 2e3
 
 
-def learnable(tests: Sequence[FieldTest], drive: Drive) -> Iterator[Learnable]:
+def learnable(tests: Sequence[FieldTest], predicted: Sequence[FloatArray],
+              drive: Drive) -> Iterator[Learnable]:
     """Yield the functions, of one motor, of both alike, and of the axis."""
-    def reached(reading: str, per: float = 1.0, turned: float = 0.0) -> list[float]:
-        seen = [test.measured[:, AT[reading]] + turned * test.start_angle for test in tests]
-        return (per * np.nanquantile(np.concatenate(seen), _ENDS)).tolist()
+    def reached(reading: str, turned: float = 0.0) -> tuple[float, float]:
+        seen = [readings[:, AT[reading]] + turned * test.start_angle
+                for test, own in zip(tests, predicted, strict=True)
+                for readings in (test.measured, own)]
+        low, high = np.nanquantile(np.concatenate(seen), _ENDS).tolist()
+        return low, high
 
     for component, motors in MOTORS.items():
         for function, by, unit, reading in _OF_A_MOTOR:
             per = drive.motor_1.motor.torque_constant if by == 'gear torque' else 1.0
-            spans = [reached(f'{reading}_{motor[-1]}', per) for motor in motors]
-            yield _law(component, f'of {component}'.replace('_', ' '), function, by, unit, (
-                min(low for low, _ in spans), max(high for _, high in spans)), [
-                    f'{motor}.motor.{function}' for motor in motors])
-    yield _law('axis', 'of the axis', 'friction_by_rate', 'rate', 'rad/s', reached(
-        'tach_1', 1.0 / drive.plant.axis.gear_ratio), ['plant.axis.friction_by_rate'])
-    yield _law('axis', 'on the axis', 'torque_by_angle', 'angle', 'rad', reached(
-        'encoder', turned=1.0), ['plant.axis.torque_by_angle'])
+            ends = [end for motor in motors for end in reached(f'{reading}_{motor[-1]}')]
+            yield _law(component, f'of {component}'.replace('_', ' '), function, by, unit, 0.0,
+                       per * max(map(abs, ends)), [
+                           f'{motor}.motor.{function}' for motor in motors])
+    most = max(map(abs, reached('tach_1'))) / drive.plant.axis.gear_ratio
+    yield _law('axis', 'of the axis', 'friction_by_rate', 'rate', 'rad/s', 0.0, most,
+               ['plant.axis.friction_by_rate'])
+    low, high = reached('encoder', turned=1.0)
+    # a middle of exactly zero would be none
+    yield _law('axis', 'on the axis', 'torque_by_angle', 'angle', 'rad',
+               0.5 * (low + high) or 1e-12, 0.5 * (high - low), ['plant.axis.torque_by_angle'])
 
 
-def _law(component: str, whose: str, function: str, by: str, unit: str, span: Sequence[float],
-         paths: Sequence[str]) -> Learnable:
-    key, (low, high) = f'{component}.{function}', span
+def _law(component: str, whose: str, function: str, by: str, unit: str, middle: float,
+         reach: float, paths: Sequence[str]) -> Learnable:
+    key, at = f'{component}.{function}', np.linspace(middle - reach, middle + reach, LAW_PLACES)
     return Learnable(
         Effect(key, component, f'{function.partition("_")[0]} {whose}', (Form(by, tuple(
             AntennaParameter(f'{key}.{k}', 'N m', -1e8, 1e8,
                              _OF_AXIS if component == 'axis' else _OF_MOTOR,
-                             modifier=Tabled(tuple(np.flatnonzero(step)), (low, high),
+                             modifier=Tabled(tuple(np.flatnonzero(step)), middle, reach,
                                              tuple(paths)))
             for k, step in enumerate(walk(LAW_PLACES).T)), scanned=True),)),
-        by, unit, tuple(np.linspace(low, high, LAW_PLACES).tolist()))
+        by, unit, tuple(at.tolist()))

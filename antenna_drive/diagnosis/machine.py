@@ -122,7 +122,8 @@ class AntennaMachine(Machine):
                                            for effect in effects.values()), self._modifiers))
         self.disturbance_inputs = tuple(disturbances(everyday_wind_torque(self._tests[0])))
         self.experiments = self._experiments({})
-        self.learnable = tuple(learnable(self._tests, drive))
+        self.learnable = tuple(learnable(
+            self._tests, [self.predict({}, k) for k in range(len(self._tests))], drive))
         self._modifiers.register(p for law in self.learnable
                                  for p in law.effect.forms[0].parameters)
         self.planning = {'sheet': sheet_tree(_in_common([test.sheet for test in self._tests]))}

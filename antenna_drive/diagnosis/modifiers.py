@@ -168,20 +168,21 @@ class FieldChange(RunModifier):
 
 @dataclass(frozen=True)
 class Tabled(RunModifier):
-    """Adds to values of a learnt function, whose outer values are at the ends of a span."""
+    """Adds to values of a learnt function, which reaches so far about its middle."""
 
     places: tuple[int, ...]  # of the values
-    span: tuple[float, float]
+    middle: float
+    reach: float
     fields: tuple[str, ...]  # the functions
 
     def apply(self, run: RunSetup, value: float) -> None:
         for path in self.fields:
-            # angles count from where the run begins
-            first = run.start_angle if path.endswith('angle') else 0.0
             for place in self.places:
                 run.change(f'{path}.{place}', ADD, value)
-            for end, x in enumerate(self.span):
-                run.change(f'{path}_span.{end}', SET, x - first)
+            run.change(f'{path}_reach', SET, self.reach)
+            run.change(f'{path.rpartition(".")[0]}.learnt', SET, 1.0)
+            if self.middle:  # of an angle, which counts from where the run begins
+                run.change(f'{path}_middle', SET, self.middle - run.start_angle)
 
 
 @dataclass(frozen=True)

@@ -27,13 +27,14 @@ SHARE_STARTS = ('zero', 'steady')
 
 _PHASE = ('rad', -2.0 * math.pi, 2.0 * math.pi)
 
-# A learnt function has so many values, at even distances.
-LAW_PLACES = 12
+# A learnt function has so many values, at even distances from -reach to reach.
+LAW_PLACES = 13
 
 
-def _list(count: int, unit: str, description: str) -> Any:
-    """Declare the values of a learnt function, or the two places of its outer ones."""
-    return option((0.0,) * count, Entry(unit, -1e8, 1e8, description, lengths=(count, count)))
+def _law(description: str) -> Any:
+    """Declare the values of a learnt function."""
+    return option((0.0,) * LAW_PLACES, Entry(
+        'N m', -1e8, 1e8, description, lengths=(LAW_PLACES, LAW_PLACES)))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -119,12 +120,13 @@ class Motor:
     torque_ripple_second_phase: float = effect(0.0, *_PHASE, 'phase of that harmonic')
     torque_ripple_third: float = effect(0.0, 'N m', 0.0, 20.0, 'amplitude of its third harmonic')
     torque_ripple_third_phase: float = effect(0.0, *_PHASE, 'phase of that harmonic')
-    friction_by_rate: tuple[float, ...] = _list(LAW_PLACES, 'N m', 'further friction, by rate')
-    friction_by_rate_span: tuple[float, ...] = _list(2, 'rad/s', 'rates of its outer values')
-    friction_by_load: tuple[float, ...] = _list(LAW_PLACES, 'N m', 'the same, by gear torque')
-    friction_by_load_span: tuple[float, ...] = _list(2, 'N m', 'torques of its outer values')
-    torque_by_current: tuple[float, ...] = _list(LAW_PLACES, 'N m', 'further torque, by current')
-    torque_by_current_span: tuple[float, ...] = _list(2, 'article A', 'of its outer values')
+    learnt: float = effect(0.0, '1', 0.0, 1.0, 'share of the learnt functions that acts')
+    friction_by_rate: tuple[float, ...] = _law('further friction, by rate')
+    friction_by_rate_reach: float = effect(1.0, 'rad/s', 1e-9, 1e4, 'rate of its last value')
+    friction_by_load: tuple[float, ...] = _law('further friction, by gear torque')
+    friction_by_load_reach: float = effect(1.0, 'N m', 1e-9, 1e4, 'torque of its last value')
+    torque_by_current: tuple[float, ...] = _law('further torque, by current')
+    torque_by_current_reach: float = effect(1.0, 'article A', 1e-9, 1e4, 'of its last value')
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -239,10 +241,12 @@ class Axis:
     gravity_torque: float = effect(
         0.0, 'N m', -1e7, 1e7, 'imbalance: torque at zero elevation, pulling down')
     steady_wind_torque: float = effect(0.0, 'N m', -1e7, 1e7, 'torque of a steady wind')
-    friction_by_rate: tuple[float, ...] = _list(LAW_PLACES, 'N m', 'further friction, by rate')
-    friction_by_rate_span: tuple[float, ...] = _list(2, 'rad/s', 'rates of its outer values')
-    torque_by_angle: tuple[float, ...] = _list(LAW_PLACES, 'N m', 'further torque, by angle')
-    torque_by_angle_span: tuple[float, ...] = _list(2, 'rad', 'angles of its outer values')
+    learnt: float = effect(0.0, '1', 0.0, 1.0, 'share of the learnt functions that acts')
+    friction_by_rate: tuple[float, ...] = _law('further friction, by rate')
+    friction_by_rate_reach: float = effect(1.0, 'rad/s', 1e-9, 1e4, 'rate of its last value')
+    torque_by_angle: tuple[float, ...] = _law('further torque, by angle')
+    torque_by_angle_reach: float = effect(1.0, 'rad', 1e-9, 1e4, 'of its last value')
+    torque_by_angle_middle: float = effect(0.0, 'rad', -10.0, 10.0, 'angle of its middle value')
 
     @property
     def mode_inertias_count(self) -> int:

@@ -23,7 +23,9 @@ def driving_torque(current: float, angle: float, p: Motor) -> float:
         torque += wave(angle, p.torque_ripple, p.torque_ripple_second, p.torque_ripple_third,
                        p.torque_ripple_cycles, p.torque_ripple_phase,
                        p.torque_ripple_second_phase, p.torque_ripple_third_phase)
-    return torque + tabled(current, p.torque_by_current_span, p.torque_by_current)
+    if p.learnt != 0.0:
+        torque += p.learnt * tabled(current, p.torque_by_current_reach, p.torque_by_current)
+    return torque
 
 
 @inner
@@ -41,8 +43,11 @@ def friction_level(rate: float, gear_torque: float, p: Motor) -> float:
     dragging = drag(rate, p.viscous_friction, p.viscous_rate, p.flow_index)
     level = slip_level(rate, coulomb, dragging, p.stribeck_torque, p.stribeck_rate,
                        p.stribeck_shape, p.friction_asymmetry)
-    level += tabled(rate, p.friction_by_rate_span, p.friction_by_rate)
-    return max(0.0, level + tabled(gear_torque, p.friction_by_load_span, p.friction_by_load))
+    if p.learnt != 0.0:
+        further = tabled(rate, p.friction_by_rate_reach, p.friction_by_rate) + tabled(
+            gear_torque, p.friction_by_load_reach, p.friction_by_load)
+        level = max(0.0, level + p.learnt * further)
+    return level
 
 
 @inner

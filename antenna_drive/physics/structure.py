@@ -54,7 +54,10 @@ def _driving_torque(t: float, x: FloatArray, u: FloatArray, p: Axis) -> float:
     torque += held(u, INPUT.external_torque, t) + p.steady_wind_torque
     if p.gravity_torque != 0.0:
         torque -= p.gravity_torque * cosine(p.start_elevation + x[STATE.axis_angle])
-    return torque + tabled(x[STATE.axis_angle], p.torque_by_angle_span, p.torque_by_angle)
+    if p.learnt != 0.0:
+        torque += p.learnt * tabled(x[STATE.axis_angle] - p.torque_by_angle_middle,
+                                    p.torque_by_angle_reach, p.torque_by_angle)
+    return torque
 
 
 @inner
@@ -79,7 +82,10 @@ def _friction_level(rate: float, angle: float, p: Axis) -> float:
     dragging = drag(rate, p.viscous_friction, p.viscous_rate, p.flow_index)
     level = slip_level(rate, coulomb, dragging, p.stribeck_torque, p.stribeck_rate,
                        p.stribeck_shape, 0.0)
-    return max(0.0, level + tabled(rate, p.friction_by_rate_span, p.friction_by_rate))
+    if p.learnt != 0.0:
+        level = max(0.0, level + p.learnt * tabled(
+            rate, p.friction_by_rate_reach, p.friction_by_rate))
+    return level
 
 
 @inner

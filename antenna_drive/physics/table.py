@@ -4,20 +4,18 @@
 
 from typing import Any
 
-from simgap.laws.compiling import inner
+from simgap.laws.compiling import shared
 
 
-@inner
-def tabled(x: float, span: Any, values: Any) -> float:
+@shared
+def tabled(x: float, reach: float, values: Any) -> float:
     """
     Return a function at x: straight lines between its values, and the outer ones beyond.
 
-    span : where its first and its last value is, the others at even distances; equal for none
-    values : arrays of shape (2,) and (n,), which a typed set has as tuples
+    reach : its values are at even distances from -reach to reach
+    values : an array of shape (n,), which a typed set has as a tuple
     """
-    if not span[1] > span[0]:
-        return 0.0
     last = len(values) - 1
-    place = min(max((x - span[0]) / (span[1] - span[0]), 0.0), 1.0) * last
+    place = min(max(0.5 + 0.5 * x / reach, 0.0), 1.0) * last
     k = min(int(place), last - 1)
     return float(values[k] + (place - k) * (values[k + 1] - values[k]))

@@ -3,13 +3,16 @@
 """
 A law as a hypothesis: it acts in the simulation, and is judged as an effect of the catalogue is.
 
-It is fitted beside all that the best hypothesis has, at noise that is white, because slow noise
-takes a gap for its own. Then both are compared at the noise that the better of them leaves.
+A function that the machine's own equations have room for acts within the loop: a friction that it
+adds can stick. It is fitted as an effect is, beside the best hypothesis and beside none. Any other
+law is a course of an input, computed again from the motion that it makes. It is fitted at noise
+that is white, because slow noise takes a gap for its own. Then law and best are compared at the
+noise that the better of them leaves.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,16 +23,21 @@ from simgap.machine.with_law import Law, WithLaw
 from simgap.search import moves
 from simgap.search.evidence import Evidence
 from simgap.search.hypothesis import Hypothesis
+from simgap.search.screening import Sensitivity
 from simgap.search.search import Found
 from simgap.settings import IntervalSettings
 from simgap.verdict.held_out import held_out
+from simgap.verdict.input_evidence import InputEvidence
 from simgap.verdict.intervals import covariance
 from simgap.verdict.law import predicted, quantities_of, REACHED
-from simgap.verdict.learning import learnt
 from simgap.verdict.unknown_input import Place, readings_of
 
 # A law moves the machine, and so what it is a function of.
 _ROUNDS = 2
+# So many of the likeliest laws within the loop are fitted beside each.
+_FITTED = 2
+# No value is farther off than so many times what it was thought to be.
+_FARTHEST = 30.0
 
 
 @dataclass(frozen=True)
@@ -48,7 +56,7 @@ class LawfulFit:
 def lawful_fit(found: Found, places: Sequence[Place], threads: int = 1) -> LawfulFit | None:
     """Return the likeliest law of all places, in the fit; None if none promises its price."""
     settings = found.problem.settings
-    begun = learnt(found) if found.problem.machine.learnable else _entering(found, places)
+    begun = _learnt(found) if found.problem.machine.learnable else _entering(found, places)
     if begun is None:
         return None
     machine, place, law = begun
@@ -73,6 +81,47 @@ def lawful_fit(found: Found, places: Sequence[Place], threads: int = 1) -> Lawfu
         place, evidence=place.law.evidence, explained=max(1.0 - law.cost / rival.cost, 0.0),
         law=_as_fitted(place.law, law, machine, gained, withheld, settings.interval)),
         gained, place.law, machine, law)
+
+
+def _promised(problem: LeastSquares, base: Hypothesis) -> Iterator[tuple[Place, Sensitivity]]:
+    """Yield the laws that may act beside a hypothesis, each with what its derivatives promise."""
+    point, count = base.state.point(), len(problem.experiments)
+    evidence = InputEvidence.at(problem, point)
+    for item in problem.machine.learnable:
+        [form], effect = item.effect.forms, item.effect
+        columns = problem.jacobian(point, form.parameters, base.state.residual, central=False)
+        scaled = columns.astype(float) * (step := form.parameters[0].step)
+        square, slope = evidence.reduced([scaled[problem.rows(k)] for k in range(count)])
+        same = np.tile(np.eye(len(form.parameters)), (count, 1))  # its values in all tests
+        square, slope = same.T @ square @ same, same.T @ slope
+        if (size := float(np.trace(square)) / len(square)) <= 0.0:
+            continue
+        found = evidence.weighed(square, slope, size)
+        spread = max(found.spread, 1e-9) * step
+        law = Law(item.by, '', found.evidence, item.at, (), (), item.by_unit,
+                  form.parameters[0].unit, item.at[1] - item.at[0], spread, walks=True)
+        numbers = tuple(replace(p, low=-_FARTHEST * spread, high=_FARTHEST * spread,
+                                step=0.1 * spread, prior_sigma=spread, start=step * factor)
+                        for p, factor in zip(form.parameters, found.factors.tolist(), strict=True))
+        yield Place(effect.cause, effect.component, found.evidence,
+                    evidence.net(found.evidence), law), Sensitivity(
+                        effect.id, replace(form, parameters=numbers), columns)
+
+
+def _learnt(found: Found) -> tuple[Machine, Place, Hypothesis] | None:
+    """Return the law that fits best, beside the best hypothesis or none; None if none pays."""
+    problem, evidence, tried = found.problem, found.evidence, []
+    for base in [found.best, found.none][:1 + bool(found.best.effects)]:
+        whole = base.with_jacobian(problem)
+        for place, item in sorted(_promised(problem, whole), key=lambda law: -law[0].evidence)[
+                :_FITTED]:
+            if place.evidence > evidence.price([item.form]):
+                # where it is strong, its derivatives at nothing say little
+                begin = min((dict.fromkeys(item.form.start, 0.0), item.form.start),
+                            key=lambda sizes: problem.loss(problem.residuals(
+                                {**whole.state.point(), **sizes})))
+                tried.append((problem.machine, place, moves.added(problem, whole, item, begin)))
+    return min(tried, key=lambda law: law[2].cost + evidence.price(law[2].forms), default=None)
 
 
 def _entering(found: Found, places: Sequence[Place]) -> tuple[WithLaw, Place, Hypothesis] | None:
