@@ -26,12 +26,11 @@ _OF_MOTOR, _OF_AXIS = 0.05, 2e3
 def learnable(tests: Sequence[FieldTest], predicted: Sequence[FloatArray],
               drive: Drive) -> Iterator[Learnable]:
     """Yield the functions, of one motor, of both alike, and of the axis."""
-    def reached(reading: str, turned: float = 0.0) -> tuple[float, float]:
+    def reached(reading: str, turned: float = 0.0) -> list[float]:
         seen = [readings[:, AT[reading]] + turned * test.start_angle
                 for test, own in zip(tests, predicted, strict=True)
                 for readings in (test.measured, own)]
-        low, high = np.nanquantile(np.concatenate(seen), _ENDS).tolist()
-        return low, high
+        return np.nanquantile(np.concatenate(seen), _ENDS).tolist()
 
     for component, motors in MOTORS.items():
         for function, by, unit, reading in _OF_A_MOTOR:

@@ -16,6 +16,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from simgap.fit.broyden import Jacobian
 from simgap.fit.least_squares import LeastSquares
 from simgap.fit.noise import with_model_error, with_noise_left
 from simgap.machine.contract import Machine
@@ -73,9 +74,8 @@ def lawful_fit(found: Found, places: Sequence[Place], threads: int = 1) -> Lawfu
     evidence = Evidence.among(problem, [law, *rivals])
     rival = max(rivals, key=evidence)
     gained = evidence(law) - evidence(rival) - found.evidence.reach
-    withheld = None
-    if gained > 0.0:
-        withheld = held_out(problem, rivals[-1], law, threads)['explained_fraction']['value']
+    withheld = held_out(problem, rivals[-1], law, threads)['explained_fraction']['value'] if (
+        gained > 0.0) else None
     assert place.law is not None
     return LawfulFit(replace(
         place, evidence=place.law.evidence, explained=max(1.0 - law.cost / rival.cost, 0.0),
@@ -83,13 +83,12 @@ def lawful_fit(found: Found, places: Sequence[Place], threads: int = 1) -> Lawfu
         gained, place.law, machine, law)
 
 
-def _promised(problem: LeastSquares, base: Hypothesis) -> Iterator[tuple[Place, Sensitivity]]:
+def _promised(problem: LeastSquares, base: Hypothesis,
+              derivatives: Sequence[Jacobian]) -> Iterator[tuple[Place, Sensitivity]]:
     """Yield the laws that may act beside a hypothesis, each with what its derivatives promise."""
-    point, count = base.state.point(), len(problem.experiments)
-    evidence = InputEvidence.at(problem, point)
-    for item in problem.machine.learnable:
+    evidence, count = InputEvidence.at(problem, base.state.point()), len(problem.experiments)
+    for item, columns in zip(problem.machine.learnable, derivatives, strict=True):
         [form], effect = item.effect.forms, item.effect
-        columns = problem.jacobian(point, form.parameters, base.state.residual, central=False)
         scaled = columns.astype(float) * (step := form.parameters[0].step)
         square, slope = evidence.reduced([scaled[problem.rows(k)] for k in range(count)])
         same = np.tile(np.eye(len(form.parameters)), (count, 1))  # its values in all tests
@@ -110,11 +109,14 @@ def _promised(problem: LeastSquares, base: Hypothesis) -> Iterator[tuple[Place, 
 
 def _learnt(found: Found) -> tuple[Machine, Place, Hypothesis] | None:
     """Return the law that fits best, beside the best hypothesis or none; None if none pays."""
-    problem, evidence, tried = found.problem, found.evidence, []
+    problem, evidence, tried, state = found.problem, found.evidence, [], found.best.state
+    derivatives = [problem.jacobian(
+        state.point(), item.effect.forms[0].parameters, state.residual, central=False)
+        for item in problem.machine.learnable]
     for base in [found.best, found.none][:1 + bool(found.best.effects)]:
         whole = base.with_jacobian(problem)
-        for place, item in sorted(_promised(problem, whole), key=lambda law: -law[0].evidence)[
-                :_FITTED]:
+        laws = sorted(_promised(problem, whole, derivatives), key=lambda law: -law[0].evidence)
+        for place, item in laws[:_FITTED]:
             if place.evidence > evidence.price([item.form]):
                 # where it is strong, its derivatives at nothing say little
                 begin = min((dict.fromkeys(item.form.start, 0.0), item.form.start),
