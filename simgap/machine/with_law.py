@@ -15,7 +15,7 @@ from simgap.machine.effect import Effect, Form, Parameter
 from simgap.machine.machine import DisturbanceInput, Machine, Wrapped
 
 # No value of a law is farther off than so many times what it was thought to be.
-_FARTHEST = 30.0
+FARTHEST = 30.0
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class Law:
 
     def as_form(self, prefix: str = '') -> Form:
         """Return its numbers as the sizes of a form."""
-        most = _FARTHEST * max(self.spread, *map(abs, self.values))
+        most = FARTHEST * max(self.spread, *map(abs, self.values))
         names = [f'{wave} {order}' for wave in ('cos', 'sin') for order in self.orders] or [
             f'at {at:.6g}' for at in self.at]
         return Form(str(self), tuple(Parameter(

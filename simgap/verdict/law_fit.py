@@ -20,7 +20,7 @@ from simgap.fit.broyden import Jacobian
 from simgap.fit.least_squares import LeastSquares
 from simgap.fit.noise import with_model_error, with_noise_left
 from simgap.machine.contract import Machine
-from simgap.machine.with_law import Law, WithLaw
+from simgap.machine.with_law import FARTHEST, Law, WithLaw
 from simgap.search import moves
 from simgap.search.evidence import Evidence
 from simgap.search.hypothesis import Hypothesis
@@ -37,8 +37,6 @@ from simgap.verdict.unknown_input import Place, readings_of
 _ROUNDS = 2
 # So many of the likeliest laws within the loop are fitted beside each.
 _FITTED = 2
-# No value is farther off than so many times what it was thought to be.
-_FARTHEST = 30.0
 
 
 @dataclass(frozen=True)
@@ -99,7 +97,7 @@ def _promised(problem: LeastSquares, base: Hypothesis,
         spread = max(found.spread, 1e-9) * step
         law = Law(item.by, '', found.evidence, item.at, (), (), item.by_unit,
                   form.parameters[0].unit, item.at[1] - item.at[0], spread, walks=True)
-        numbers = tuple(replace(p, low=-_FARTHEST * spread, high=_FARTHEST * spread,
+        numbers = tuple(replace(p, low=-FARTHEST * spread, high=FARTHEST * spread,
                                 step=0.1 * spread, prior_sigma=spread, start=step * factor)
                         for p, factor in zip(form.parameters, found.factors.tolist(), strict=True))
         yield Place(effect.cause, effect.component, found.evidence,
@@ -110,6 +108,7 @@ def _promised(problem: LeastSquares, base: Hypothesis,
 def _learnt(found: Found) -> tuple[Machine, Place, Hypothesis] | None:
     """Return the law that fits best, beside the best hypothesis or none; None if none pays."""
     problem, evidence, tried, state = found.problem, found.evidence, [], found.best.state
+    hope = problem.settings.search.hope  # of the search: by how much a fit may exceed its promise
     derivatives = [problem.jacobian(
         state.point(), item.effect.forms[0].parameters, state.residual, central=False)
         for item in problem.machine.learnable]
@@ -117,7 +116,8 @@ def _learnt(found: Found) -> tuple[Machine, Place, Hypothesis] | None:
         whole = base.with_jacobian(problem)
         laws = sorted(_promised(problem, whole, derivatives), key=lambda law: -law[0].evidence)
         for place, item in laws[:_FITTED]:
-            if place.evidence > evidence.price([item.form]):
+            behind = evidence(found.best) - evidence(base)
+            if place.evidence > max(evidence.price([item.form]), behind / hope):
                 # where it is strong, its derivatives at nothing say little
                 begin = min((dict.fromkeys(item.form.start, 0.0), item.form.start),
                             key=lambda sizes: problem.loss(problem.residuals(
