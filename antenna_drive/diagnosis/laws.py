@@ -36,9 +36,9 @@ def learnable(tests: Sequence[FieldTest], predicted: Sequence[FloatArray],
         for function, by, unit, reading in _OF_A_MOTOR:
             per = drive.motor_1.motor.torque_constant if by == 'gear torque' else 1.0
             ends = [end for motor in motors for end in reached(f'{reading}_{motor[-1]}')]
-            yield _law(component, f'of {component}'.replace('_', ' '), function, by, unit, 0.0,
-                       per * max(map(abs, ends)), [
-                           f'{motor}.motor.{function}' for motor in motors])
+            whose = f'of {component}'.replace('_', ' ').replace('motors', 'both motors')
+            yield _law(component, whose, function, by, unit, 0.0, per * max(map(abs, ends)), [
+                f'{motor}.motor.{function}' for motor in motors])
     most = max(map(abs, reached('tach_1'))) / drive.plant.axis.gear_ratio
     yield _law('axis', 'of the axis', 'friction_by_rate', 'rate', 'rad/s', 0.0, most,
                ['plant.axis.friction_by_rate'])
