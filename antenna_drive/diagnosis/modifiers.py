@@ -179,7 +179,7 @@ class Tabled(RunModifier):
         for path in self.fields:
             for place in self.places:
                 run.change(f'{path}.{place}', ADD, value)
-            run.change(f'{path}_reach', SET, self.reach)
+            run.change(f'{path}_reach', SET, max(self.reach, 1e-9))  # it may not move
             run.change(f'{path.rpartition(".")[0]}.learnt', SET, 1.0)
             if self.middle:  # of an angle, which counts from where the run begins
                 run.change(f'{path}_middle', SET, self.middle - run.start_angle)
