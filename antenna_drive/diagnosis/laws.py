@@ -37,20 +37,19 @@ def learnable(tests: Sequence[FieldTest], predicted: Sequence[FloatArray],
             per = drive.motor_1.motor.torque_constant if by == 'gear torque' else 1.0
             ends = [end for motor in motors for end in reached(f'{reading}_{motor[-1]}')]
             whose = f'of {component}'.replace('_', ' ').replace('motors', 'both motors')
-            yield _law(component, whose, function, by, unit, 0.0, per * max(map(abs, ends)), [
+            yield _law(component, whose, function, by, unit, None, per * max(map(abs, ends)), [
                 f'{motor}.motor.{function}' for motor in motors])
     most = max(map(abs, reached('tach_1'))) / drive.plant.axis.gear_ratio
-    yield _law('axis', 'of the axis', 'friction_by_rate', 'rate', 'rad/s', 0.0, most,
+    yield _law('axis', 'of the axis', 'friction_by_rate', 'rate', 'rad/s', None, most,
                ['plant.axis.friction_by_rate'])
     low, high = reached('encoder', turned=1.0)
-    # a middle of exactly zero would be none
-    yield _law('axis', 'on the axis', 'torque_by_angle', 'angle', 'rad',
-               0.5 * (low + high) or 1e-12, 0.5 * (high - low), ['plant.axis.torque_by_angle'])
+    yield _law('axis', 'on the axis', 'torque_by_angle', 'angle', 'rad', 0.5 * (low + high),
+               0.5 * (high - low), ['plant.axis.torque_by_angle'])
 
 
-def _law(component: str, whose: str, function: str, by: str, unit: str, middle: float,
-         reach: float, paths: Sequence[str]) -> Learnable:
-    key, at = f'{component}.{function}', np.linspace(middle - reach, middle + reach, LAW_PLACES)
+def _law(component: str, whose: str, function: str, by: str, unit: str,
+         middle: float | None, reach: float, paths: Sequence[str]) -> Learnable:
+    key, at = f'{component}.{function}', (middle or 0.0) + np.linspace(-reach, reach, LAW_PLACES)
     return Learnable(
         Effect(key, component, f'{function.partition("_")[0]} {whose}', (Form(by, tuple(
             AntennaParameter(f'{key}.{k}', 'N m', -1e8, 1e8,

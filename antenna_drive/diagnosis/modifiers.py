@@ -171,7 +171,7 @@ class Tabled(RunModifier):
     """Adds to values of a learnt function, which reaches so far about its middle."""
 
     places: tuple[int, ...]  # of the values
-    middle: float
+    middle: float | None  # of an angle, which counts from where the run begins
     reach: float
     fields: tuple[str, ...]  # the functions
 
@@ -179,9 +179,9 @@ class Tabled(RunModifier):
         for path in self.fields:
             for place in self.places:
                 run.change(f'{path}.{place}', ADD, value)
-            run.change(f'{path}_reach', SET, max(self.reach, 1e-9))  # it may not move
+            run.change(f'{path}_reach', SET, max(self.reach, 1e-9))  # 0: it stands still
             run.change(f'{path.rpartition(".")[0]}.learnt', SET, 1.0)
-            if self.middle:  # of an angle, which counts from where the run begins
+            if self.middle is not None:
                 run.change(f'{path}_middle', SET, self.middle - run.start_angle)
 
 

@@ -4,17 +4,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 import math
 from pathlib import Path
+from typing import Any
 
 from antenna_drive.recording.files import import_file, parse_map
 from antenna_drive.recording.recording import Recording
 from lab.servo.firmware import Firmware, firmware_of
 from lab.servo.physics import swing
 import numpy as np
-from simgap.errors import UserError
-from simgap.inputs.plain import from_json
+from simgap.errors import one_line, UserError
+from simgap.inputs.plain import from_json, PlainDataError
+from simgap.logs.channel import RecordingError
 from simgap.logs.text import read_text
 from simgap.machine.contract import FloatArray
 
@@ -23,10 +26,11 @@ UNITS = ('rad', 'rad/s', '1')
 POSITION, SPEED, DUTY = range(3)
 STEP_S = 2.8e-3
 # What a log of the BAM project (Rhoban) has of each sample. The load is a register of 16 bits.
+_COLUMNS = {'goal_position': 'rad', 'position': 'rad', 'speed': 'rad/s', 'load': '1',
+            'input_volts': 'V', 'temp': '1', 'torque_enable': '1'}
 _MAP = parse_map({'time': {'column': 'timestamp'}, 'signals': {
-    f'servo/{name}': {'column': name, 'unit': unit} for name, unit in {
-        'goal_position': 'rad', 'position': 'rad', 'speed': 'rad/s', 'load': '1',
-        'input_volts': 'V', 'temp': '1', 'torque_enable': '1'}.items()}})
+    'servo/temperature' if name == 'temp' else f'servo/{name}': {'column': name, 'unit': unit}
+    for name, unit in _COLUMNS.items()}})
 _NOTES = {'mass': (int, float), 'length': (int, float), 'kp': (int, float), 'vin': (int, float),
           'motor': (str,), 'trajectory': (str,)}
 
@@ -35,15 +39,32 @@ def read_bam(path: Path) -> Recording:
     """
     Return a log of the BAM project, with mass [kg], length [m], kp, vin [V], motor and trajectory.
 
-    Raises RecordingError: it cannot be read. Raises UserError: one of these is missing.
+    Raises RecordingError: it cannot be read, is no such log, or an entry lacks a number.
     """
-    recording, above = import_file(path, _MAP), from_json(read_text(path))
-    for name, kinds in _NOTES.items():
-        if not isinstance(above.get(name), kinds) or isinstance(above[name], bool):
-            raise UserError(f'{path}: {name}: {above.get(name)!r} given, allowed is a '
-                            f'{"text" if str in kinds else "number"}')
+    try:
+        above = from_json(read_text(path))
+    except PlainDataError as error:
+        raise RecordingError(f'{path}: {error}') from None
+    entries = above.get('entries') if isinstance(above, dict) else None
+    if not isinstance(entries, list):
+        raise RecordingError(f'{path}: no log of a servo, there is no list of entries')
+    _check(path, '', above, _NOTES)
+    for number, entry in enumerate(entries):
+        # a map takes texts and booleans for numbers, too
+        _check(path, f'entry {number}: ', entry, {**dict.fromkeys(
+            ('timestamp', *_COLUMNS), (int, float)), 'torque_enable': (bool,)})
+    recording = import_file(path, _MAP)
     return Recording(recording.channels, notes={
         **recording.notes, **{name: above[name] for name in _NOTES}})
+
+
+def _check(path: Path, where: str, given: Any, wanted: Mapping[str, tuple[type, ...]]) -> None:
+    for name, kinds in wanted.items():
+        value = given.get(name) if isinstance(given, dict) else None
+        if not isinstance(value, kinds) or isinstance(value, bool) and bool not in kinds:
+            kind = {str: 'a text', bool: 'true or false'}.get(kinds[0], 'a number')
+            raise RecordingError(f'{path}: {where}{name}: {one_line(repr(value), 40)} given, '
+                                 f'allowed is {kind}')
 
 
 @dataclass(frozen=True)
@@ -84,14 +105,14 @@ class ServoLog:
             raise UserError(f'{name}: {time.size} samples, at least 50 are needed')
         values = {key: np.array(recording[f'servo/{key}'].values, dtype=np.float64)
                   for key in ('position', 'speed', 'goal_position', 'torque_enable',
-                              'temp', 'load')}
+                              'temperature', 'load')}
         load = values['load']
         # the register has 16 bits in two's complement
         duty = np.where(load >= 2 ** 15, load - 2 ** 16, load) / firmware.duty_count
         return cls(name, float(notes['kp']), str(notes['trajectory']), float(notes['mass']),
                    float(notes['length']), float(notes['kp']) * firmware.error_gain,
                    float(notes['vin']), firmware, time, values['goal_position'],
-                   values['torque_enable'], values['temp'],
+                   values['torque_enable'], values['temperature'],
                    np.column_stack([values['position'], values['speed'], duty]))
 
     @property

@@ -115,8 +115,8 @@ def _learnt(found: Found) -> tuple[Machine, Place, Hypothesis] | None:
     for base in [found.best, found.none][:1 + bool(found.best.effects)]:
         whole = base.with_jacobian(problem)
         laws = sorted(_promised(problem, whole, derivatives), key=lambda law: -law[0].evidence)
+        behind = evidence(found.best) - evidence(base)
         for place, item in laws[:_FITTED]:
-            behind = evidence(found.best) - evidence(base)
             if place.evidence > max(evidence.price([item.form]), behind / hope):
                 # where it is strong, its derivatives at nothing say little
                 begin = min((dict.fromkeys(item.form.start, 0.0), item.form.start),

@@ -13,7 +13,6 @@ from antenna_drive.recording.recording import Recording
 from lab.servo.log import read_bam
 import numpy as np
 import pytest
-from simgap.errors import UserError
 from simgap.logs.channel import RecordingError
 
 FIXTURE = Path(__file__).parent / 'data' / '2026-01-15_10h28m57.json'
@@ -28,7 +27,7 @@ def check(path: Path, recording: Recording) -> None:
     entries = log['entries']
     for key, name in (('position', 'servo/position'), ('speed', 'servo/speed'),
                       ('load', 'servo/load'), ('input_volts', 'servo/input_volts'),
-                      ('temp', 'servo/temp'), ('goal_position', 'servo/goal_position'),
+                      ('temp', 'servo/temperature'), ('goal_position', 'servo/goal_position'),
                       ('torque_enable', 'servo/torque_enable')):
         assert recording[name].values.tolist() == [float(e[key]) for e in entries]
     stamps = np.array([e['timestamp'] for e in entries])
@@ -68,20 +67,22 @@ def test_all_sixteen_logs_are_read_whole() -> None:
 @pytest.mark.parametrize(('change', 'words'), [
     ({'mass': None}, 'mass: None given, allowed is a number'),
     ({'trajectory': 3}, 'trajectory: 3 given, allowed is a text'),
-    ({'entries': 3}, "the column 'timestamp' is not there"),
-    ({'entries': [3]}, "the column 'timestamp' is not there"),
+    ({'entries': 3}, 'no list of entries'),
+    ({'entries': [3]}, 'entry 0: timestamp: None given'),
 ])
 def test_what_is_no_log_is_refused(change: dict[str, object], words: str,
                                    tmp_path: Path) -> None:
     path = tmp_path / 'log.json'
     path.write_text(json.dumps({**json.loads(FIXTURE.read_text()), **change}))
-    with pytest.raises(UserError, match=words) as refusal:
+    with pytest.raises(RecordingError, match=words) as refusal:
         read_bam(path)
     assert str(refusal.value).startswith(f'{path}: ')
 
 
 @pytest.mark.parametrize(('key', 'value', 'words'), [
-    ('position', 'a', "record 3, column position: 'a' is no number"),
+    ('position', '1', "entry 2: position: '1' given, allowed is a number"),
+    ('torque_enable', 1, 'entry 2: torque_enable: 1 given, allowed is true or false'),
+    ('speed', True, 'entry 2: speed: True given'),
     ('timestamp', 0.0, 'record 3, column timestamp: the time is not later'),
     ('load', 10**400, 'record 3, column load: .* is too large a number'),
 ])
