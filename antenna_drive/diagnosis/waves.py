@@ -26,6 +26,8 @@ _OF_MOTORS = tuple((motor, part, stem) for motor in ('motor_1', 'motor_2') for p
 _WINDOW_S = 1.5
 # Number of orders about one that say what is usual there.
 _NEIGHBOURS = 9
+# A fit moves the order by this share: a short way of the axis tells no better where to look.
+_APART = 0.15
 
 
 def is_there(numbers: np.ndarray[Any, np.dtype[Any]], stem: str) -> bool:
@@ -107,7 +109,7 @@ def wave(unit: str, limit: float, step: float, shape: WaveShape, orders: tuple[f
     made = _ReadingWavePart if on_readings else _WavePart
 
     def part(index: int, name: str) -> AntennaParameter:
-        range_ = ('1', -0.05, 0.05, 2e-4) if index == 2 else (unit, -limit, limit, step)
+        range_ = ('1', -_APART, _APART, 2e-4) if index == 2 else (unit, -limit, limit, step)
         return AntennaParameter(name, *range_, is_shape=index > 1, modifier=made(shape, index),
                                 tolerance=healthy if index < 2 else 0.0)
 
@@ -137,7 +139,7 @@ def likely_orders(form: Wave, experiments: Sequence[Experiment],
     while len(found) < count and any(ranks):
         rank = ranks[len(found) % 2] or ranks[0]
         order = float(orders[rank.pop(0)])
-        near = form.shape.angle == 'axis' and any(abs(np.log(order / f)) < 0.15 for f in found)
+        near = form.shape.angle == 'axis' and any(abs(np.log(order / f)) < _APART for f in found)
         if order not in found and not near:
             found.append(order)
     return found

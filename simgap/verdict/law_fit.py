@@ -44,8 +44,7 @@ class LawfulFit:
     """The likeliest law beside the best hypothesis, and how much more it makes likely."""
 
     place: Place  # with the law as it was fitted, where the motion reaches it
-    # evidence beyond that of the best of the catalogue, with the law's price and the reach of what
-    # an error of form may do
+    # evidence beyond that of the best of the catalogue and what shows a law, with its price
     gained: float
     law: Law  # with all its places, as it was begun with
     machine: Machine
@@ -71,7 +70,7 @@ def lawful_fit(found: Found, places: Sequence[Place], threads: int = 1) -> Lawfu
         [found.best, found.none] if found.best.effects else [found.best])]
     evidence = Evidence.among(problem, [law, *rivals])
     rival = max(rivals, key=evidence)
-    gained = evidence(law) - evidence(rival) - found.evidence.reach
+    gained = evidence(law) - evidence(rival) - settings.evidence.shows
     withheld = held_out(problem, rivals[-1], law, threads)['explained_fraction']['value'] if (
         gained > 0.0) else None
     assert place.law is not None
