@@ -57,35 +57,31 @@ def visibility(problem: LeastSquares, state: FitState,
     here, state = state.point(), _without_everyday(state)
     jacobian = state.jacobian.astype(float)
     imitated = solver(state.hessian + np.diag(proper_precision(state.parameters)))
-    ids, units, sizes, columns, remainders = [], [], [], [], []
     price = inflated * settings.evidence.shows
     hessian = state.hessian + np.diag(prior_precision(state.parameters))
     low, high = (np.array([getattr(p, side) for p in state.parameters]) - state.x
                  for side in ('low', 'high'))
-    unbounded = solver(hessian)
     sure = 1.0 - settings.interval.derivative_error ** 2
     asked = [effect for effect in machine.catalogue.values() if not among or effect.id in among]
-    for i, effect in enumerate(asked):
+    forms = [machine.catalogue.typical_form(effect) for effect in asked]
+    firsts = [form.parameters[0] for form in forms]
+    # an effect that is not there has no shape either: all are looked at from one point
+    shapes = {name: value for form in forms for name, value in form.shapes.items() if value}
+    columns = problem.jacobian({**here, **shapes}, firsts, state.residual, central=False)
+    crosses = jacobian.T @ columns
+    powers, followed, sizes = np.sum(np.square(columns), axis=0), solver(hessian)(crosses), []
+    for i, (first, cross, power, step) in enumerate(zip(
+            firsts, crosses.T, powers.tolist(), followed.T, strict=True)):
         progress(i / len(asked))
-        form = machine.catalogue.typical_form(effect)
-        first = form.parameters[0]
-        column = problem.jacobian({**here, **form.shapes}, [first], state.residual,
-                                  central=False)[:, 0]
-        cross = jacobian.T @ column.astype(float)
-        ids.append(effect.id)
-        units.append(first.unit)
-        power = float(column @ column)
-        free = 0.5 * (power * sure - float(cross @ unbounded(cross)))
+        free = 0.5 * (power * sure - float(cross @ step))
         sizes.append(_least_visible(first, power, free, partial(
-            _left, hessian, cross, power * sure, low, high), price))
-        columns.append(column)
-        remainders.append(column - jacobian @ imitated(cross))
+            _left, hessian, cross, power * sure, low, high, step, free), price))
     # what nuisances imitate has the price of their priors
-    shape = (len(asked), state.residual.size)
-    gram = np.reshape(columns, shape) @ np.reshape(remainders, shape).T
+    gram = columns.T @ (columns - jacobian @ imitated(crosses))
     size = np.sqrt(np.maximum(np.diag(gram), 1e-30))
     alike = (gram / np.outer(size, size)) ** 2
-    return Confusability(tuple(ids), np.array(sizes), tuple(units), np.asarray(alike),
+    return Confusability(tuple(effect.id for effect in asked), np.array(sizes),
+                         tuple(first.unit for first in firsts), np.asarray(alike),
                          settings.confusability.alike)
 
 
@@ -96,8 +92,10 @@ def _without_everyday(state: FitState) -> FitState:
 
 
 def _left(hessian: FloatArray, cross: FloatArray, power: float, low: FloatArray, high: FloatArray,
-          size: float) -> float:
+          followed: FloatArray, free: float, size: float) -> float:
     """Return what nuisances within their bounds leave of a size [half chi-square]."""
+    if np.all(low <= -size * followed) and np.all(-size * followed <= high):
+        return size ** 2 * free
     gradient = -size * cross
     step = box_constrained_step(hessian, gradient, low, high)
     return 0.5 * size ** 2 * power - float(gradient @ step - 0.5 * step @ hessian @ step)
