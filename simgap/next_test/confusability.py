@@ -67,7 +67,8 @@ def visibility(problem: LeastSquares, state: FitState,
     firsts = [form.parameters[0] for form in forms]
     # an effect that is not there has no shape either: all are looked at from one point
     shapes = {name: value for form in forms for name, value in form.shapes.items() if value}
-    columns = problem.jacobian({**here, **shapes}, firsts, state.residual, central=False)
+    columns = problem.jacobian(
+        {**here, **shapes}, firsts, state.residual, central=False).astype(float)
     crosses = jacobian.T @ columns
     powers, followed, sizes = np.sum(np.square(columns), axis=0), solver(hessian)(crosses), []
     for i, (first, cross, power, step) in enumerate(zip(

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy import linalg
+from simgap.fit.broyden import Jacobian
 from simgap.fit.least_squares import LeastSquares
 from simgap.fit.state import prior_precision
 from simgap.machine.contract import FloatArray
@@ -38,8 +39,9 @@ class InputEvidence:
     """The residual that is to be explained, with the nuisances projected out."""
 
     @classmethod
-    def at(cls, problem: LeastSquares, point: Mapping[str, float]) -> InputEvidence:
-        """Return that of a problem whose nuisances have been fitted."""
+    def at(cls, problem: LeastSquares, point: Mapping[str, float],
+           slopes: Jacobian | None = None) -> InputEvidence:
+        """Return that of a problem whose nuisances have been fitted; `slopes` by them if known."""
         here = dict(point)
         residual = problem.residuals(here)
         level = max(problem.noise_level(residual), 1e-9)
@@ -47,13 +49,14 @@ class InputEvidence:
         weight = np.where(problem.valid, np.minimum(
             1.0, bound / np.maximum(np.abs(residual), 1e-12)), 0.0) / level ** 2
         nuisances = problem.machine.nuisances
-        jacobian = problem.jacobian(here, nuisances, residual, central=False).astype(float)
+        if slopes is None:
+            slopes = problem.jacobian(here, nuisances, residual, central=False)
         # what is quieter than the noise that is stated is no gap
         stated = np.concatenate([np.tile([colour.level for colour in e.colours]
                                          or np.ones(len(e.channels)), e.time.size)
                                  for e in problem.experiments])
         loud = min(1.0, float(np.mean((stated * residual)[problem.valid] ** 2)))
-        return cls(residual, loud, weight, jacobian, prior_precision(nuisances))
+        return cls(residual, loud, weight, slopes.astype(float), prior_precision(nuisances))
 
     def __init__(self, residual: FloatArray, loud: float, weight: FloatArray,
                  nuisances: FloatArray, prior: FloatArray) -> None:

@@ -83,7 +83,8 @@ def lawful_fit(found: Found, places: Sequence[Place], threads: int = 1) -> Lawfu
 def _promised(problem: LeastSquares, base: Hypothesis,
               derivatives: Sequence[Jacobian]) -> Iterator[tuple[Place, Sensitivity]]:
     """Yield the laws that may act beside a hypothesis, each with what its derivatives promise."""
-    evidence, count = InputEvidence.at(problem, base.state.point()), len(problem.experiments)
+    evidence, count = InputEvidence.at(problem, base.state.point(), base.state.jacobian[
+        :, :len(problem.machine.nuisances)]), len(problem.experiments)
     for item, columns in zip(problem.machine.learnable, derivatives, strict=True):
         [form], effect = item.effect.forms, item.effect
         scaled = columns.astype(float) * (step := form.parameters[0].step)

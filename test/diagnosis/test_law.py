@@ -120,7 +120,8 @@ def lawful(machine: Machine) -> LawfulFit:
     """Return the likeliest law in the fit of a machine."""
     problem = LeastSquares(machine)
     none = Hypothesis((), (), problem.fit(problem.start(machine.nuisances, {}), 5))
-    fit = lawful_fit(Found(problem, [none], Evidence.among(problem, [none])), [] if machine.learnable else places(
+    found = Found(problem, [none], Evidence.among(problem, [none]))
+    fit = lawful_fit(found, [] if machine.learnable else places(
         problem, none.state.point(), problem))
     assert fit is not None
     return fit
