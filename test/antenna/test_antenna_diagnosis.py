@@ -164,6 +164,7 @@ def test_recording_of_a_command_alone_is_refused() -> None:
         AntennaMachine({'field': recording}, load())
 
 
+@pytest.mark.slow
 def test_confusability_knows_what_one_elevation_cannot_tell() -> None:
     tests = {name: planned(BUILT_IN['triangle'], 6.0, 100.0) for name in ('a',)}
     found = confusability_of(tests, load(), threads=1)

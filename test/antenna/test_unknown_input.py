@@ -50,6 +50,7 @@ def disturbed(place_name: str, strength: float, seed: int, fastest: float = 1.5)
     ('torque on the axis', 0.4, 'axis'), ('friction of motor 2', 0.4, 'motor_2'),
     ('voltage in amplifier 1', 0.4, 'motor_1'), ('reading of tachometer 2', 3.0, 'tach_2'),
 ])
+@pytest.mark.slow
 def test_part_that_something_unknown_enters_is_told(name: str, strength: float,
                                                     component: str) -> None:
     """The input is no pulse, and its answer is not linear: the part is found all the same."""
@@ -66,6 +67,7 @@ def test_part_that_something_unknown_enters_is_told(name: str, strength: float,
 
 
 @pytest.mark.parametrize('seed', [3, 4, 5])
+@pytest.mark.slow
 def test_a_displacement_of_teeth_is_as_likely_as_a_reading_that_it_resembles(seed: int) -> None:
     """Through the rate loop both look alike: which is the first is a matter of the noise."""
     found = places(LeastSquares(disturbed('displacement in gearbox 1', 3.0, seed=seed)), {})
@@ -80,6 +82,7 @@ def test_noise_alone_enters_nowhere() -> None:
     assert found[0].evidence < 20.0
 
 
+@pytest.mark.slow
 def test_a_wind_of_every_day_is_nothing_unknown() -> None:
     """A slow torque of half the everyday size would be something on a day without wind."""
     machine = disturbed('torque on the axis', 0.03, seed=3, fastest=0.3)

@@ -56,6 +56,7 @@ def test_a_brief_recording_stays_whole() -> None:
 
 @pytest.mark.parametrize('signal', [SLOW_SINE, FAST_TRIANGLE])
 @pytest.mark.parametrize('rest', [4.002, 9.002, 30.002])
+@pytest.mark.slow
 def test_after_a_rest_the_window_agrees_with_the_recording(signal: dict[str, Any],
                                                            rest: float) -> None:
     recording = field_run(DRIVE, rest + 40.0, SHEET, start_after=rest, **signal)

@@ -40,6 +40,7 @@ def results() -> Results:
     return Results(with_circuits())
 
 
+@pytest.mark.slow
 def test_every_figure_is_a_file_and_on_the_page(
         short_load: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr('antenna_drive.cli.article.EXPERIMENTS', ('T3a',))

@@ -171,6 +171,7 @@ def test_a_conclusion_follows_from_the_configuration() -> None:
 
 
 @pytest.mark.parametrize('seed', [1, 2])
+@pytest.mark.slow
 def test_the_basis_of_a_row_says_what_the_free_parameters_change(seed: int) -> None:
     problem = read_problem(SHIPPED / 'article.yaml')
     start = np.array(problem.start())

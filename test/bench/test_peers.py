@@ -75,6 +75,7 @@ def test_python_and_compiled_equations_are_the_same() -> None:
 @pytest.mark.skipif(shutil.which(c_loop.COMPILER) is None, reason='there is no C compiler')
 @pytest.mark.parametrize('name', ['T1', 'T2', 'T3a', 'T3b', 'T4a', 'T4e'])
 @pytest.mark.parametrize('step_s', [5e-4, 1e-3, 4e-3])
+@pytest.mark.slow
 def test_loop_in_c_gives_the_same_bits(name: str, step_s: float) -> None:
     drive = experiments()[name].drive()
     with c_loop.compiled() as library:

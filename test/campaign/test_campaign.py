@@ -60,6 +60,7 @@ def trial(files: int = 30) -> Trial:
     return Trial('mutations', 'change_0', {'files': files}, 120.0)
 
 
+@pytest.mark.slow
 def test_a_campaign_that_is_started_again_leaves_out_what_is_done(tmp_path: Path) -> None:
     done: list[str] = []
     campaign = Campaign(tmp_path, SETTINGS)
@@ -76,6 +77,7 @@ def test_a_campaign_that_is_started_again_leaves_out_what_is_done(tmp_path: Path
     assert done == ['mutations-change_0']
 
 
+@pytest.mark.slow
 def test_damaged_files_side_by_side_end_as_they_do_alone(tmp_path: Path) -> None:
     trials = [Trial('mutations', f'{reader}_0', {'files': 100}, 120.0)
               for reader in ('change', 'frame')]

@@ -137,6 +137,7 @@ def test_what_a_terminal_cannot_show_is_shown_otherwise(tmp_path: Path) -> None:
     ('-m', 'antenna_drive', 'compile'), ('-m', 'antenna_drive', 'confusability'),
     ('-m', 'antenna_drive', 'run', '--duration', '0.1', '--out', '{out}.csv'),
     ('-m', 'lab', 'trial', '--cases', '1', '--seed', '7', '--out', '{out}')], ids=' '.join)
+@pytest.mark.slow
 def test_a_compiler_that_is_switched_off_is_told(words: tuple[str, ...], tmp_path: Path) -> None:
     done = start(tuple(word.format(out=tmp_path / 'out') for word in words), '"$@"',
                  NUMBA_DISABLE_JIT='1')

@@ -112,6 +112,7 @@ class PushedEveryDay(TwoLags):
                           TwoLags.disturbance_inputs[1])
 
 
+@pytest.mark.slow
 def test_a_force_of_every_day_is_no_gap_and_more_of_it_is_found_in_its_place() -> None:
     little = 0.25 * smooth(5), 0.0 * TIME
     assert diagnose(TwoLags(*little)).word == 'unknown_effect'

@@ -93,6 +93,7 @@ async def _turn_the_drive(url: str) -> None:
         assert not told['ok'] and reason in told['reason'], told
 
 
+@pytest.mark.slow
 def test_a_page_turns_a_drive_which_ends_with_it(module_domain: int, tmp_path: Path) -> None:
     with LiveCommand(tmp_path, module_domain) as live:
         assert status(live.url) == 200
@@ -127,6 +128,7 @@ async def _join(url: str) -> None:
     assert (await client.ask('run', service='resume'))['ok']
 
 
+@pytest.mark.slow
 def test_a_drive_that_was_joined_goes_on_without_the_page(
         module_domain: int, tmp_path: Path) -> None:
     with DriveProcesses(config=['new_circuit'], namespace='/east',
@@ -158,6 +160,7 @@ def test_wrong_options_are_said_in_one_line(
     assert said.count('\n') == 1
 
 
+@pytest.mark.slow
 def test_a_port_that_is_taken_is_said_in_one_line(
         module_domain: int, tmp_path: Path) -> None:
     with LiveCommand(tmp_path, module_domain, '--join') as first:

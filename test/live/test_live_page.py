@@ -28,6 +28,7 @@ def last_change(page: Page) -> Any:
     return page.tell('document.querySelector("#nodes table:nth-of-type(2) td")?.textContent || ""')
 
 
+@pytest.mark.slow
 def test_curves_and_numbers_move(page: Page) -> None:
     for signal in ('test_signal/rate_command', 'motor_1/current', 'plant/encoder'):
         text = f'document.querySelector(\'#diagram [data-signal="{signal}"]\').textContent'
@@ -39,6 +40,7 @@ def test_curves_and_numbers_move(page: Page) -> None:
           return new Set(new Uint32Array(all.data.buffer)).size > 20; }); })()""")
 
 
+@pytest.mark.slow
 def test_a_slider_that_is_dragged_turns_the_drive(page: Page) -> None:
     slider = f'{BIAS_POT} input[type="range"]'
     value = f'Number(document.querySelector({slider!r}).value)'
@@ -141,6 +143,7 @@ def test_a_test_signal_is_seen_before_it_is_played(page: Page) -> None:
     page.until(f"document.querySelector('{form} button.main').disabled")
 
 
+@pytest.mark.slow
 def test_an_experiment_starts_the_drive_as_in_the_article(page: Page) -> None:
     run = page.tell(f'{SAMPLES}.run')
     page.click('#tab-article')

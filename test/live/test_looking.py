@@ -59,6 +59,7 @@ def paused(page: Page) -> Iterator[Page]:
     page.until(f'{STATE} === "playing"')
 
 
+@pytest.mark.slow
 def test_a_window_grows_from_ten_seconds(page: Page) -> None:
     first, last = span(page)
     now = page.tell(f'{SAMPLES}.time')
@@ -158,6 +159,7 @@ def test_published_levels_are_named_where_no_curve_is(page: Page) -> None:
         return box('.head').bottom <= box('.u-over').top; })()""")
 
 
+@pytest.mark.slow
 def test_what_is_obtained_stands_beside_what_is_published(page: Page) -> None:
     page.click('#tab-article')
     row = 'document.querySelector(\'[data-measure="T3b.{}"]\')?.textContent'

@@ -22,6 +22,7 @@ ROWS = ('[...document.querySelectorAll("#nodes table:first-of-type tr")]'
         '.map(row => row.textContent)')
 
 
+@pytest.mark.slow
 def test_a_killed_node_and_a_server_that_has_gone_look_stale(
         module_domain: int, tmp_path: Path, browser: Page) -> None:
     with DriveProcesses(config=['old_circuit'], namespace='/east',

@@ -37,6 +37,7 @@ def idle(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures('idle')
+@pytest.mark.slow
 def test_processes_at_full_speed_are_placed(two_cores: set[int]) -> None:
     with DriveProcesses({TEST_SIGNAL: {'run.pace': 0.0}}, commands=WAITING) as drive:
         pids = {unit: drive.process(unit).pid for unit in UNITS}
@@ -49,6 +50,7 @@ def test_processes_at_full_speed_are_placed(two_cores: set[int]) -> None:
 
 
 @pytest.mark.usefixtures('idle')
+@pytest.mark.slow
 def test_a_node_started_again_is_placed_as_before(two_cores: set[int]) -> None:
     with DriveProcesses({TEST_SIGNAL: {'run.pace': 0.0}}, commands=WAITING) as drive:
         core = os.sched_getaffinity(drive.process(PLANT).pid)
@@ -60,6 +62,7 @@ def test_a_node_started_again_is_placed_as_before(two_cores: set[int]) -> None:
 
 @pytest.mark.usefixtures('idle')
 @pytest.mark.parametrize('parameters', [{}, {TEST_SIGNAL: {'run.pace': 1.0}}])
+@pytest.mark.slow
 def test_processes_at_a_pace_are_left_to_the_system(
         two_cores: set[int], parameters: dict[str, dict[str, float]]) -> None:
     with DriveProcesses(parameters, commands=WAITING) as drive:
@@ -68,6 +71,7 @@ def test_processes_at_a_pace_are_left_to_the_system(
             assert os.sched_getaffinity(drive.process(unit).pid) == two_cores
 
 
+@pytest.mark.slow
 def test_on_a_busy_machine_they_are_left_to_the_system(
         two_cores: set[int], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(processes, 'machine_is_idle', lambda: False)

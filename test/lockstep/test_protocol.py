@@ -384,6 +384,7 @@ def test_an_invented_run_is_refused_while_the_run_goes_on(
 
 @settings(deadline=None, max_examples=60)
 @given(some, st.sets(st.sampled_from(UNITS[1:]), min_size=1), invented_runs, moves, st.booleans())
+@pytest.mark.slow
 def test_who_was_led_into_an_invented_run_comes_back(
         in_loops: Collection[str], victims: set[str], invented: float,
         choices: list[tuple[str, str, bool]],

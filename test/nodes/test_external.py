@@ -30,6 +30,7 @@ def test_the_greatest_rate_is_that_of_a_motor_without_a_load() -> None:
 @pytest.mark.usefixtures('node_domain')
 @pytest.mark.parametrize(('parameters', 'taken', 'refused'), [
     ({}, 0.015, 0.0153), ({}, -0.015, -0.8), ({'run.external_limit': 0.1}, 0.09, 0.11)])
+@pytest.mark.slow
 def test_what_is_beyond_is_refused_and_said(parameters: dict[str, Value], taken: float,
                                             refused: float) -> None:
     with Watch() as watch, DriveProcesses(

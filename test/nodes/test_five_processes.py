@@ -83,6 +83,7 @@ def assert_same_bits(got: FloatArray, want: FloatArray) -> None:
 
 
 @pytest.mark.usefixtures('fresh_domain')
+@pytest.mark.slow
 def test_random_start_order_and_a_busy_machine_change_no_bit() -> None:
     seed = random.randrange(1000)
     order = random.Random(seed).sample(UNITS, len(UNITS))
@@ -103,6 +104,7 @@ def test_random_start_order_and_a_busy_machine_change_no_bit() -> None:
 
 @pytest.mark.usefixtures('fresh_domain')
 @pytest.mark.parametrize('exchange', EXCHANGES, indirect=True)
+@pytest.mark.slow
 def test_changes_refusals_and_foreign_frames_in_one_run(exchange: str) -> None:
     parameters = {'test_signal': {**ENDLESS, 'waveform': 'external', 'run.step': 2e-3}}
     with Watch() as watch, Recorder(NAME) as recorder, DriveProcesses(
@@ -214,6 +216,7 @@ def _announcement(recorder: Recorder, run: float) -> list[float]:
 
 @pytest.mark.usefixtures('fresh_domain')
 @pytest.mark.parametrize('exchange', IN_FAULTS, indirect=True)
+@pytest.mark.slow
 def test_each_node_killed_is_missed_and_started_again_begins_a_new_run(
         exchange: str) -> None:
     with Watch() as watch, Recorder(NAME) as recorder, DriveProcesses(
@@ -267,6 +270,7 @@ INVENTED = 2**52 - 1
 
 @pytest.mark.usefixtures('fresh_domain')
 @pytest.mark.parametrize('exchange', IN_FAULTS, indirect=True)
+@pytest.mark.slow
 def test_a_run_that_is_invented_while_nothing_moves_is_overruled(exchange: str) -> None:
     """A drive that stands still cannot tell an invention from an announcement, and recovers."""
     with Watch() as watch, Recorder(NAME) as recorder, DriveProcesses(
@@ -322,6 +326,7 @@ def _at_step(recorder: Recorder, processes: DriveProcesses, step: int) -> bool:
 
 
 @pytest.mark.usefixtures('fresh_domain')
+@pytest.mark.slow
 def test_a_guest_joins_late_at_real_time_pace_and_loses_nothing() -> None:
     with Watch() as watch, DriveProcesses(
             {'test_signal': {'run.pace': 0.5, 'run.step': 2e-3}}) as processes:
@@ -335,6 +340,7 @@ def test_a_guest_joins_late_at_real_time_pace_and_loses_nothing() -> None:
 
 
 @pytest.mark.usefixtures('fresh_domain')
+@pytest.mark.slow
 def test_two_drives_in_two_namespaces_do_not_meet() -> None:
     circuits = {'/east': ('old_circuit',), '/west': ('new_circuit',)}
     with Watch() as watch, Recorder(NAME, '/east') as east, Recorder(
@@ -382,6 +388,7 @@ def _alive(pid: int) -> bool:
     return state not in 'ZX'
 
 
+@pytest.mark.slow
 def test_the_check_command_finds_no_difference(fresh_domain: int) -> None:
     done = subprocess.run(
         [sys.executable, '-m', 'antenna_drive', 'lockstep-check', '--duration', '0.5',

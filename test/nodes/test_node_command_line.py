@@ -66,6 +66,7 @@ def test_help_needs_no_ros(node: str) -> None:
     ('recorder', ('-p', 'sync:=[]'), 'sync'), ('twin', ('-p', 'alarms_per_day:=[]'), 'alarms_per'),
 ])
 @pytest.mark.usefixtures('node_domain')
+@pytest.mark.slow
 def test_wrong_input_is_one_line_and_exit_code_2(
         node: str, args: tuple[str, ...], said: str) -> None:
     pytest.importorskip('rclpy', reason='rclpy is not installed')

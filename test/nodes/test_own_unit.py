@@ -29,6 +29,7 @@ EXAMPLES = Path(__file__).parents[2] / 'examples'
 
 
 @pytest.mark.usefixtures('fresh_domain')
+@pytest.mark.slow
 def test_own_torque_share_joins_the_other_four(monkeypatch: pytest.MonkeyPatch) -> None:
     package = str(EXAMPLES / 'own_torque_share')
     monkeypatch.syspath_prepend(package)
@@ -75,6 +76,7 @@ run_unit(Stuck())
 
 
 @pytest.mark.usefixtures('fresh_domain')
+@pytest.mark.slow
 def test_own_unit_that_does_not_return_is_ended_and_says_where_it_was() -> None:
     path = os.pathsep.join([str(EXAMPLES / 'own_torque_share'), *sys.path])
     with Recorder('watcher') as recorder, Watch() as watch, DriveProcesses(
@@ -90,6 +92,7 @@ def test_own_unit_that_does_not_return_is_ended_and_says_where_it_was() -> None:
 
 
 @pytest.mark.usefixtures('fresh_domain')
+@pytest.mark.slow
 def test_own_position_loop_is_a_sixth_unit(monkeypatch: pytest.MonkeyPatch) -> None:
     package = str(EXAMPLES / 'own_position_loop')
     monkeypatch.syspath_prepend(package)

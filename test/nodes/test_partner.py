@@ -36,6 +36,7 @@ def parameters(on_miss: str, exchange: str) -> dict[str, dict[str, Any]]:
 
 @pytest.mark.usefixtures('fresh_domain')
 @pytest.mark.parametrize(('on_miss', 'exchange'), [('zero', 'auto'), ('stop', 'python')])
+@pytest.mark.slow
 def test_a_partner_is_followed_missed_and_replayed(on_miss: str, exchange: str) -> None:
     with Watch() as watch, Recorder('watcher') as recorder, DriveProcesses(
             parameters(on_miss, exchange), commands={'test_signal': STAND_IN}) as processes:

@@ -39,6 +39,7 @@ def test_the_unit_plays_what_the_sheet_says(tmp_path: Path) -> None:
     assert np.abs(np.array(played) - expected).max() < 1e-15
 
 
+@pytest.mark.slow
 def test_five_processes_play_the_sheet_and_the_bag_carries_it(
         tmp_path: Path, fresh_domain: int) -> None:
     pytest.importorskip('rclpy', reason='rclpy is not installed: no processes to test')

@@ -84,6 +84,7 @@ def watch(live: LiveCommand, module_domain: int) -> Iterator[Watch]:
         yield watch
 
 
+@pytest.mark.slow
 def test_joints_are_the_readings_of_the_same_time(live: LiveCommand, watch: Watch,
                                                   module_domain: int) -> None:
     states: dict[str, list[Any]] = {'joint_states': [], 'motor_states': []}

@@ -59,6 +59,7 @@ def settings_of(parameters: dict[str, Any], prefix: str = 'test_signal.rate.') -
 
 @pytest.mark.usefixtures('fresh_domain')
 @pytest.mark.parametrize('exchange', ['auto', pytest.param('python', marks=pytest.mark.trial)])
+@pytest.mark.slow
 def test_an_operator_controls_the_run_and_changes_no_bit(exchange: str, tmp_path: Path) -> None:
     if exchange == 'auto':
         for unit in UNITS:

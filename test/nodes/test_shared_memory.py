@@ -38,6 +38,7 @@ def plant() -> Iterator[DriveProcesses]:
 
 
 @pytest.mark.usefixtures('fresh_domain')
+@pytest.mark.slow
 def test_a_node_whose_port_was_removed_says_that_it_hears_nobody(plant: DriveProcesses) -> None:
     with Watch() as watch:
         pid = plant.process('plant').pid

@@ -42,6 +42,7 @@ def time_ns(node: Node) -> int:
 
 @pytest.mark.usefixtures('fresh_domain')
 @pytest.mark.parametrize('tools', ['/east', '/east/tools'])
+@pytest.mark.slow
 def test_a_tool_in_the_namespace_of_a_drive_has_its_time(tools: str) -> None:
     with Watch('/east') as watch, DriveProcesses(PACE, namespace='/east'):
         stamps: set[int] = set()
@@ -61,6 +62,7 @@ def test_a_tool_in_the_namespace_of_a_drive_has_its_time(tools: str) -> None:
 
 
 @pytest.mark.usefixtures('fresh_domain')
+@pytest.mark.slow
 def test_the_time_of_somebody_else_is_told_apart() -> None:
     """Another simulator has /clock; the drive leaves it alone, and says what its tools need."""
     with Watch() as watch, DriveProcesses(PACE, namespace='/east') as processes:
@@ -77,6 +79,7 @@ def test_the_time_of_somebody_else_is_told_apart() -> None:
 
 
 @pytest.mark.usefixtures('fresh_domain')
+@pytest.mark.slow
 def test_of_two_drives_the_first_one_has_it() -> None:
     """Only one publishes; the conductors alone are there, and their tools."""
     with Watch() as watch, DriveProcesses(order=['test_signal'], namespace='/east') as east, \

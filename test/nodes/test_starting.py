@@ -27,6 +27,7 @@ OTHERS = tuple(unit for unit in UNITS if unit != 'test_signal')
 
 
 @pytest.mark.usefixtures('fresh_domain')
+@pytest.mark.slow
 def test_each_says_once_that_it_is_ready_and_whom_it_waits_for() -> None:
     with Watch() as watch, DriveProcesses(order=['test_signal', 'plant']) as processes:
         def said(unit: str, text: str) -> bool:
@@ -75,6 +76,7 @@ def test_those_who_only_read_say_so_too(node: str, arguments: tuple[str, ...], w
         assert line.endswith(f']: ready; waits for {waits}')
 
 
+@pytest.mark.slow
 def test_the_second_of_a_name_says_so_where_it_was_started(node_domain: int) -> None:
     with Watch() as watch, DriveProcesses(order=['torque_share']) as first, DriveProcesses(
             order=['torque_share']) as second:

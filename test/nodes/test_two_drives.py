@@ -83,6 +83,7 @@ def pair(folder: Path, duration: float, apart_s: float, *options: str) -> list[s
 
 
 @pytest.mark.usefixtures('fresh_domain')
+@pytest.mark.slow
 def test_two_recordings_begun_together_hold_each_its_own_drive(tmp_path: Path) -> None:
     assert pair(tmp_path / 'pair', 1.0, 0.0) == [OWN, OWN]
 
@@ -148,6 +149,7 @@ def test_a_live_page_beside_a_drive_names_the_way_to_join(
 
 
 @pytest.mark.usefixtures('fresh_domain')
+@pytest.mark.slow
 def test_a_recorder_of_two_drives_names_both_and_ends_with_1(tmp_path: Path) -> None:
     with ExitStack() as stack:
         for circuit in CIRCUITS:
@@ -172,6 +174,7 @@ def no_look(given: str | None, *others: object) -> Iterator[str]:
 
 @pytest.mark.usefixtures('fresh_domain')
 @pytest.mark.parametrize('begun', ['before', 'after'])
+@pytest.mark.slow
 def test_who_meets_another_drive_all_the_same_is_told(
         tmp_path: Path, begun: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """The frames tell: their senders are no processes of the drive, or two have one name."""

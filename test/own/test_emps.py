@@ -39,6 +39,7 @@ def test_nothing_is_wrong_with_the_model(model: Model) -> None:
     assert check_model(model, [read_log(DATA / 'emps.csv')]).faults == []
 
 
+@pytest.mark.slow
 def test_the_asymmetric_friction_is_named(plain: Verdict) -> None:
     named = next(entry for entry in plain.which if entry.effects != ['unknown'])
     assert 'guide.friction_asymmetry' in named.effects
@@ -54,6 +55,7 @@ def test_the_recording_that_was_not_fitted_is_predicted_better(plain: Verdict) -
     assert error.after < 0.7 * min(error.configured, error.before)
 
 
+@pytest.mark.slow
 def test_the_hidden_pulses_are_found(model: Model) -> None:
     """A force, when and how large: 20 of 24 within 50 ms, sizes within 15 percent."""
     log = read_log(DATA / 'emps_pulses.csv')

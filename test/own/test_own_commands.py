@@ -145,6 +145,7 @@ def test_check_model_says_yes_or_what_is_wrong(folder: Path,
     assert capsys.readouterr().out.endswith(f'{len(faults)} to mend\n')
 
 
+@pytest.mark.slow
 def test_both_programs_say_the_same(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     model, logs = f'{folder}/model.py', [f'{folder}/far.csv', f'{folder}/near.csv']
     assert main(['diagnose', '--model', model, *logs, '--json', f'{folder}/a.json']) == 0

@@ -94,6 +94,7 @@ def test_the_second_harmonic_of_a_ripple_is_no_effect_of_its_own() -> None:
     assert numbers['wave_cosine_2']['value'] == pytest.approx(0.004, rel=0.1)
 
 
+@pytest.mark.slow
 def test_what_pushes_is_told_with_its_place_its_times_and_its_size() -> None:
     """Three pushes of one size: within 50 ms, and the size within 15 percent."""
     edges = ((3.0, 4.5), (8.0, 9.0), (14.0, 16.5))
@@ -114,6 +115,7 @@ def test_what_pushes_is_told_with_its_place_its_times_and_its_size() -> None:
 
 @pytest.mark.parametrize('everyday, drift, word', [
     (0.0, 0.0, 'unknown_effect'), (0.004, 0.0, 'no_gap'), (0.004, 0.01, 'explained')])
+@pytest.mark.slow
 def test_what_pushes_every_day_is_no_gap(everyday: float, drift: float, word: str) -> None:
     """A wind of four times the noise, which changes within half a second."""
     random = np.random.default_rng(4)
@@ -143,6 +145,7 @@ def test_a_log_that_was_not_used_is_predicted_to_the_noise_with_the_effect_only(
     assert error.configured > error.before
 
 
+@pytest.mark.slow
 def test_what_repeats_itself_each_turn_is_a_law_of_waves_and_predicts_a_log() -> None:
     """Two orders of an angle that turns, one of them too fast for a pulse; noise is 1 mrad."""
     waves = {'wave_cosine': 0.01, 'wave_order': 23.0}

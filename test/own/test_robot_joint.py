@@ -31,6 +31,7 @@ def logs_with(faults: dict[str, float], first_seed: int = 0, **labels: str) -> l
     return made
 
 
+@pytest.mark.slow
 def test_a_joint_in_good_order_has_no_gap() -> None:
     logs = logs_of('nothing')
     assert check_model(MODEL, logs).faults == []
@@ -43,6 +44,7 @@ def test_a_joint_in_good_order_has_no_gap() -> None:
     ('asymmetry', 'motor.friction_asymmetry', 'asymmetry', 0.25),
     ('ripple', 'motor.ripple', 'ripple_sine@6', 0.02),
     ('delay', 'controller.delay', 'delay', 0.004)])
+@pytest.mark.slow
 def test_the_fault_of_a_joint_is_named_with_its_size(fault: str, effect: str, number: str,
                                                      size: float) -> None:
     first = diagnose_logs(MODEL, logs_of(fault)).which[0]
@@ -62,6 +64,7 @@ def test_an_answer_does_not_turn_with_the_rate_at_which_samples_are_compared(fau
     assert max(probabilities) - min(probabilities) < 0.1
 
 
+@pytest.mark.slow
 def test_a_law_in_the_place_of_what_the_list_lacks_predicts_a_log_that_it_never_saw() -> None:
     """As well as the true effect would; the logs have noise of 0.02 A."""
     found = diagnose_logs(MODEL, logs_of('asymmetry'), without=['motor.friction_asymmetry'])
@@ -71,6 +74,7 @@ def test_a_law_in_the_place_of_what_the_list_lacks_predicts_a_log_that_it_never_
         assert current.after > 0.07 and current.lawful == pytest.approx(0.02, rel=0.1)
 
 
+@pytest.mark.slow
 def test_what_a_repair_changes_is_told_and_what_it_leaves_too() -> None:
     """The asymmetry falls from 0.35 to 0.15; the delay of the bus is the same."""
     found = diagnose_logs(MODEL, [

@@ -69,6 +69,7 @@ def runs(pid: int) -> bool:
 
 
 @pytest.mark.parametrize('options', [['-p', 'no:xdist'], ['-n', '1']], ids=['alone', 'xdist'])
+@pytest.mark.slow
 def test_what_waits_for_ever_fails_and_leaves_nothing(tmp_path: Path, options: list[str]) -> None:
     (tmp_path / 'test_it.py').write_text(WAITS.format(folder=tmp_path) + FINE)
     said = run_pytest(tmp_path, *options)
@@ -78,6 +79,7 @@ def test_what_waits_for_ever_fails_and_leaves_nothing(tmp_path: Path, options: l
         assert not runs(int((tmp_path / name).read_text()))
 
 
+@pytest.mark.slow
 def test_what_cannot_be_interrupted_ends_its_worker(tmp_path: Path) -> None:
     """The tests that follow are run by another worker."""
     (tmp_path / 'test_it.py').write_text(LOOPS + FINE)

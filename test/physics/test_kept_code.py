@@ -83,6 +83,7 @@ DAMAGES: dict[str, Callable[[bytes], bytes]] = {
 
 @pytest.mark.parametrize('damage', DAMAGES)
 @pytest.mark.parametrize('suffix', ['.nbi', '.nbc'])
+@pytest.mark.slow
 def test_a_damaged_file_is_told_and_replaced(program: Program, suffix: str, damage: str) -> None:
     for path in program.files():
         if path.suffix == suffix:
@@ -98,6 +99,7 @@ def test_a_damaged_file_is_told_and_replaced(program: Program, suffix: str, dama
     assert program.run() == (KEPT, '')
 
 
+@pytest.mark.slow
 def test_a_full_disk_is_told_and_stops_nothing(tmp_path: Path) -> None:
     program = Program(tmp_path)
     printed, said = program.run('full')

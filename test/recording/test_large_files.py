@@ -44,6 +44,7 @@ def mapped(path: Path) -> Path:
     lambda path: read_logs([path]),
     lambda path: read_logs([path], mapped(path.parent))],
     ids=['drive', 'drive, mapped', 'log', 'log, mapped'])
+@pytest.mark.slow
 def test_a_cell_takes_few_bytes(read: Callable[[Path], object], tmp_path: Path) -> None:
     path = table(tmp_path / 'rec.csv', 20_000, COLUMNS)
     read(table(tmp_path / 'few.csv', 10, COLUMNS))  # whatever is loaded once

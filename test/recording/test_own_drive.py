@@ -63,6 +63,7 @@ def test_a_bag_with_other_rows_than_steps_is_refused(tmp_path: Path, rows: int) 
         own_drive.check_rows(tmp_path / 'run', 3)
 
 
+@pytest.mark.slow
 def test_a_recording_without_its_rows_is_never_called_done(
         tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
         fresh_domain: int) -> None:

@@ -181,6 +181,7 @@ def recorder(*parameters: str, **more: Any) -> RecorderProcess:
     return RecorderProcess('--ros-args', *(item for p in parameters for item in ('-p', p)), **more)
 
 
+@pytest.mark.slow
 def test_the_record_command_loses_nothing_and_changes_nothing(
         tmp_path: Path, capsys: pytest.CaptureFixture[str], fresh_domain: int) -> None:
     out = tmp_path / 'run'
@@ -202,6 +203,7 @@ def test_the_record_command_loses_nothing_and_changes_nothing(
     assert recording.configuration['torque_share']['k_2'] == -3.502
 
 
+@pytest.mark.slow
 def test_a_recorder_joins_a_running_drive_and_keeps_every_step(
         tmp_path: Path, fresh_domain: int) -> None:
     (tmp_path / 'sheet.yaml').write_text('circuit: new\n')
@@ -237,6 +239,7 @@ WRONG_CHANGES = (
     '{"run": 5, "step": 0, "changes": {"a": "\\ud800"}}')
 
 
+@pytest.mark.slow
 def test_whatever_is_said_of_changes_the_recorder_goes_on(
         tmp_path: Path, fresh_domain: int) -> None:
     with Drive(['recorder'], pace=KEPT_PACE) as drive:
@@ -261,6 +264,7 @@ def test_whatever_is_said_of_changes_the_recorder_goes_on(
     assert set(read_bag(tmp_path / 'run').configuration) == set(UNITS)
 
 
+@pytest.mark.slow
 def test_a_killed_recorder_loses_a_second_at_most(tmp_path: Path, fresh_domain: int) -> None:
     # A guest: the drive would wait for the return of any other.
     with Drive(pace=PACE_FOR_A_GUEST) as drive:
@@ -284,6 +288,7 @@ def test_a_killed_recorder_loses_a_second_at_most(tmp_path: Path, fresh_domain: 
         assert set(read_bag(tmp_path / 'run', partial=True).configuration) == set(UNITS)
 
 
+@pytest.mark.slow
 def test_a_new_run_gets_a_new_bag(tmp_path: Path, fresh_domain: int) -> None:
     with Drive(['recorder'], pace=1.0) as drive, recorder(f'out:={tmp_path}/run') as process:
         drive.until(lambda: process.said('recording from step'))
@@ -301,6 +306,7 @@ def test_a_new_run_gets_a_new_bag(tmp_path: Path, fresh_domain: int) -> None:
     assert read_bag(tmp_path / 'run_run_2').start_ns == 0
 
 
+@pytest.mark.slow
 def test_what_a_node_has_sent_before_it_ends_reaches_a_busy_recorder(
         tmp_path: Path, fresh_domain: int) -> None:
     out = tmp_path / 'run'
@@ -341,6 +347,7 @@ sys.exit(main(sys.argv[1:]))
 """
 
 
+@pytest.mark.slow
 def test_a_full_disk_is_told_and_stops_nothing_else(tmp_path: Path, fresh_domain: int) -> None:
     # even a drive that waits for the recorder at every step goes on
     with Drive(['recorder'], pace=0.0) as drive, recorder(
@@ -354,6 +361,7 @@ def test_a_full_disk_is_told_and_stops_nothing_else(tmp_path: Path, fresh_domain
         assert len(read_bag(tmp_path / 'run', partial=True)['plant/encoder']) > 100
 
 
+@pytest.mark.slow
 def test_a_good_run_does_not_make_up_for_a_bad_one(tmp_path: Path, fresh_domain: int) -> None:
     with Drive(['recorder'], pace=0.0) as drive, recorder(
             f'out:={tmp_path}/run', program=('-c', FULL_DISK)) as process:
@@ -383,6 +391,7 @@ sys.exit(main(sys.argv[1:]))
 """
 
 
+@pytest.mark.slow
 def test_a_drive_that_waits_for_frames_which_a_killed_node_has_not_sent_begins_again(
         tmp_path: Path, fresh_domain: int) -> None:
     with Drive(['recorder'], pace=0.0) as drive, recorder(
@@ -397,6 +406,7 @@ def test_a_drive_that_waits_for_frames_which_a_killed_node_has_not_sent_begins_a
     assert read_bag(tmp_path / 'run_run_2').start_ns == 0
 
 
+@pytest.mark.slow
 def test_a_recorded_command_is_played_by_a_node_as_in_one_process(
         tmp_path: Path, fresh_domain: int) -> None:
     time = np.arange(0.0, 1.0, 0.013)
@@ -428,6 +438,7 @@ def test_a_player_without_a_recording_says_so() -> None:
             assert words in process.lines[0]
 
 
+@pytest.mark.slow
 def test_wrong_arguments_are_refused_in_one_line(tmp_path: Path,
                                                  capsys: pytest.CaptureFixture[str]) -> None:
     for arguments, words in ((['--out', 'x'], 'ROS 2 arguments follow --ros-args'),

@@ -162,6 +162,7 @@ def test_mutated_maps_are_refused_or_maps(count: int, tmp_path: Path) -> None:
     lambda text: text.encode(errors='replace')), st.lists(
         st.sampled_from([*POISON, b'time_s', b'rate_command_rad_s', b'1', b'0.5', b'\n', b',']),
         max_size=40).map(b''.join)))
+@pytest.mark.slow
 def test_invented_files_are_refused_or_read(tmp_path: Path, data: bytes) -> None:
     for name, read in (('a.csv', read_csv), ('a.yaml', load_sheet), ('a.mcap', read_bag),
                        ('b.yaml', load_map)):

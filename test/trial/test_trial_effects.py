@@ -81,6 +81,7 @@ def test_family_b_has_other_laws_for_the_same_effects_and_other_outsiders() -> N
 
 
 @pytest.mark.parametrize('effect', OTHER_LAWS, ids=lambda effect: effect.key)
+@pytest.mark.slow
 def test_the_other_law_is_another_one(effect: Defect) -> None:
     assert np.any(signals(effect, 1.0) != signals(CATALOGUE[effect.key], 1.0))
 
@@ -88,6 +89,7 @@ def test_the_other_law_is_another_one(effect: Defect) -> None:
 @pytest.mark.parametrize('effect', [*CATALOGUE.values(), *OUTSIDE.values(), *OTHER_LAWS,
                                     *family_b.OUTSIDE.values()],
                          ids=lambda effect: effect.form[:40] + effect.key)
+@pytest.mark.slow
 def test_every_effect_shows_at_both_ends_of_its_range(effect: Defect) -> None:
     before = unchanged_signals()
     for size in (0.0, 1.0):

@@ -78,6 +78,7 @@ def test_every_effect_changes_what_is_read_and_leaves_it_finite(machine: str) ->
 
 
 @pytest.mark.parametrize('machine', MACHINES)
+@pytest.mark.slow
 def test_references_stay_within_reach_and_begin_at_rest(machine: str) -> None:
     table = kind_of(machine).table
     for seed in range(40):

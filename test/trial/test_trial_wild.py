@@ -51,6 +51,7 @@ def truth_of(folder: Path, case: str) -> dict[str, Any]:
     return truth
 
 
+@pytest.mark.slow
 def test_every_recording_can_be_read_and_has_the_rows_that_its_truth_leaves(made: Path) -> None:
     for k in range(1, COUNT + 1):
         case = f'case_{k:04d}'

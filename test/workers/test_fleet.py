@@ -185,6 +185,7 @@ def test_a_machine_that_breaks_loses_its_old_verdict(fleet: Path, told: Told) ->
 
 
 @pytest.mark.skipif(not sys.platform.startswith('linux'), reason='no limit of another process')
+@pytest.mark.slow
 def test_memory_is_bounded(tmp_path: Path, told: Told,
                            capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / 'fleet').mkdir()
