@@ -263,6 +263,7 @@ class Search:
     def _compared(self) -> Found:
         """Fit the best to the whole tests, at the noise that the best of them shows."""
         self._progress(0.6, 'the best in full')
+        self._sensitivities = []  # large, and nothing is added from here on
         options = self._options
         ranked, evidence = self._ranked(), self._evidence()
         best, none = ranked[0], self._found[frozenset()]
