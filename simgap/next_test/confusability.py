@@ -136,6 +136,6 @@ def could_hide(problem: LeastSquares, state: FitState,
                inflated: float = 1.0) -> list[dict[str, Any]]:
     """Return how large each effect could be and still hide in these tests, for the JSON."""
     found = visibility(problem, state, inflated=inflated)
-    return [{'effect': effect, 'size': float(size) if np.isfinite(size) else None, 'unit': unit}
-            for effect, size, unit in zip(found.effects, found.detectable, found.units,
-                                          strict=True)]
+    sized = zip(found.effects, found.detectable.tolist(), found.units, strict=True)
+    return [{'effect': effect, 'size': size if math.isfinite(size) else None, 'unit': unit}
+            for effect, size, unit in sized]

@@ -42,15 +42,13 @@ class InputEvidence:
     def at(cls, problem: LeastSquares, point: Mapping[str, float],
            slopes: Jacobian | None = None) -> InputEvidence:
         """Return that of a problem whose nuisances have been fitted; `slopes` by them if known."""
-        here = dict(point)
-        residual = problem.residuals(here)
+        residual = problem.residuals(dict(point))
         level = max(problem.noise_level(residual), 1e-9)
-        bound = problem.settings.noise.clip * level
-        weight = np.where(problem.valid, np.minimum(
-            1.0, bound / np.maximum(np.abs(residual), 1e-12)), 0.0) / level ** 2
+        weight = np.where(problem.valid, np.minimum(1.0, problem.settings.noise.clip * level
+                          / np.maximum(np.abs(residual), 1e-12)), 0.0) / level ** 2
         nuisances = problem.machine.nuisances
         if slopes is None:
-            slopes = problem.jacobian(here, nuisances, residual, central=False)
+            slopes = problem.jacobian(dict(point), nuisances, residual, central=False)
         # what is quieter than the noise that is stated is no gap
         stated = np.concatenate([np.tile([colour.level for colour in e.colours]
                                          or np.ones(len(e.channels)), e.time.size)

@@ -44,8 +44,7 @@ class LawfulFit:
     """The likeliest law beside the best hypothesis, and how much more it makes likely."""
 
     place: Place  # with the law as it was fitted, where the motion reaches it
-    # evidence beyond that of the best of the catalogue and what shows a law, with its price
-    gained: float
+    gained: float  # evidence beyond the best of the catalogue and what shows a law
     law: Law  # with all its places, as it was begun with
     machine: Machine
     hypothesis: Hypothesis  # the best one with the law, whose values are those of its last form
