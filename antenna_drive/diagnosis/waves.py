@@ -137,8 +137,7 @@ def likely_orders(form: Wave, experiments: Sequence[Experiment],
     found: list[float] = []
     ranks = [list(np.argsort(by)[::-1]) for by in (peak, energy)]
     while len(found) < count and any(ranks):
-        rank = ranks[len(found) % 2] or ranks[0]
-        order = float(orders[rank.pop(0)])
+        order = float(orders[(ranks[len(found) % 2] or ranks[0]).pop(0)])
         near = form.shape.angle == 'axis' and any(abs(np.log(order / f)) < _APART for f in found)
         if order not in found and not near:
             found.append(order)
