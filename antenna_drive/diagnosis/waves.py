@@ -26,7 +26,7 @@ _OF_MOTORS = tuple((motor, part, stem) for motor in ('motor_1', 'motor_2') for p
 _WINDOW_S = 1.5
 # Number of orders about one that say what is usual there.
 _NEIGHBOURS = 9
-# A fit moves the order by this share: a short way of the axis tells no better where to look.
+# Candidate orders of the axis are this share apart, and a fit may move an order as far.
 _APART = 0.15
 
 
@@ -137,7 +137,8 @@ def likely_orders(form: Wave, experiments: Sequence[Experiment],
     found: list[float] = []
     ranks = [list(np.argsort(by)[::-1]) for by in (peak, energy)]
     while len(found) < count and any(ranks):
-        order = float(orders[(ranks[len(found) % 2] or ranks[0]).pop(0)])
+        rank = ranks[len(found) % 2] or ranks[0]
+        order = float(orders[rank.pop(0)])
         near = form.shape.angle == 'axis' and any(abs(np.log(order / f)) < _APART for f in found)
         if order not in found and not near:
             found.append(order)

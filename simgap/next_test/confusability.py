@@ -55,7 +55,6 @@ def visibility(problem: LeastSquares, state: FitState,
     machine, settings = problem.machine, problem.settings
     # an everyday size would imitate its own effect; up to the tolerance nothing is said to show
     here, state = state.point(), _without_everyday(state)
-    jacobian = state.jacobian.astype(float)
     imitated = solver(state.hessian + np.diag(proper_precision(state.parameters)))
     price = inflated * settings.evidence.shows
     hessian = state.hessian + np.diag(prior_precision(state.parameters))
@@ -69,7 +68,7 @@ def visibility(problem: LeastSquares, state: FitState,
     shapes = {name: value for form in forms for name, value in form.shapes.items() if value}
     columns = problem.jacobian(
         {**here, **shapes}, firsts, state.residual, central=False).astype(float)
-    crosses = jacobian.T @ columns
+    crosses = state.jacobian.T @ columns
     powers, followed, sizes = np.sum(np.square(columns), axis=0), solver(hessian)(crosses), []
     for i, (first, cross, power, step) in enumerate(zip(
             firsts, crosses.T, powers.tolist(), followed.T, strict=True)):
@@ -78,7 +77,7 @@ def visibility(problem: LeastSquares, state: FitState,
         sizes.append(_least_visible(first, power, free, partial(
             _left, hessian, cross, power * sure, low, high, step, free), price))
     # what nuisances imitate has the price of their priors
-    gram = columns.T @ (columns - jacobian @ imitated(crosses))
+    gram = columns.T @ (columns - state.jacobian @ imitated(crosses))
     size = np.sqrt(np.maximum(np.diag(gram), 1e-30))
     alike = (gram / np.outer(size, size)) ** 2
     return Confusability(tuple(effect.id for effect in asked), np.array(sizes),
