@@ -5,12 +5,13 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Iterator
+from contextlib import ExitStack
 import os
 
 import hanging
 from hypothesis import settings
 from installations import install_with_colcon, install_with_pip, Installation
-from lab.campaign.domains import DomainClaim
+from lab.campaign.domains import claimed_domain
 import pytest
 
 # Nothing here is judged by how long it takes: the first call of compiled code compiles.
@@ -24,10 +25,10 @@ ONE_AT_A_TIME = {'session_domain', 'module_domain', 'fresh_domain', 'colcon_inst
 
 def pytest_configure(config: pytest.Config) -> None:
     """Put the whole session, and every process that it starts, into a domain of its own."""
-    claim = DomainClaim()
-    config.add_cleanup(claim.release)
+    ending = ExitStack()
+    config.add_cleanup(ending.close)
     config.pluginmanager.register(hanging)
-    os.environ['ROS_DOMAIN_ID'] = str(claim.number)
+    os.environ['ROS_DOMAIN_ID'] = str(ending.enter_context(claimed_domain()))
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
 
@@ -60,18 +61,16 @@ def session_domain() -> int:
 @pytest.fixture(scope='module')
 def module_domain() -> Iterator[int]:
     """Return a ROS 2 domain for what one file of tests starts, which must be told it."""
-    claim = DomainClaim()
-    yield claim.number
-    claim.release()
+    with claimed_domain() as domain:
+        yield domain
 
 
 @pytest.fixture
 def node_domain(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
     """Put one test, and the processes that it starts, into a domain apart from the others."""
-    claim = DomainClaim()
-    monkeypatch.setenv('ROS_DOMAIN_ID', str(claim.number))
-    yield claim.number
-    claim.release()
+    with claimed_domain() as domain:
+        monkeypatch.setenv('ROS_DOMAIN_ID', str(domain))
+        yield domain
 
 
 @pytest.fixture

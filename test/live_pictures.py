@@ -18,7 +18,7 @@ from typing import Any
 from antenna_drive.parameters.loading import load
 from antenna_drive.twin.growing import GrowingVerdict, look_of
 from chromium import Page
-from lab.campaign.domains import DomainClaim
+from lab.campaign.domains import claimed_domain
 from later import Later
 from live_command import LiveCommand
 from stand_in_twin import StandInTwin
@@ -51,15 +51,14 @@ def grown() -> dict[str, Any]:
 
 def main(folder: Path) -> None:
     """Write every picture into a folder."""
-    claim = DomainClaim()
-    with tempfile.TemporaryDirectory() as scratch, \
-            LiveCommand(Path(scratch), claim.number) as live, \
+    with claimed_domain() as domain, tempfile.TemporaryDirectory() as scratch, \
+            LiveCommand(Path(scratch), domain) as live, \
             Page(Path(scratch, 'profile')) as page:
         page.open(live.url)
         page.until(f'antennaDrive.samples.time > {LENGTH_S}', 600.0)
         page.tell('(() => { const s = document.getElementById("span"); s.value = 30;'
                   ' s.dispatchEvent(new Event("change")); })()')
-        twin = StandInTwin(claim.number, 'twin')
+        twin = StandInTwin(domain, 'twin')
         twin.say(grown())
         page.until('document.querySelectorAll("#twin polyline").length', 90.0)
         for name, width, height, dark, tab in PICTURES:
@@ -70,7 +69,6 @@ def main(folder: Path) -> None:
                        '&& !document.querySelector(".twin.stale, body.stale")')
             page.picture(folder / name)
         twin.close()
-    claim.release()
 
 
 if __name__ == '__main__':

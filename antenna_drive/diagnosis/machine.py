@@ -199,12 +199,6 @@ class AntennaMachine(Machine):
 
     # -- running -------------------------------------------------------------------------------
 
-    def predict(self, point: Point, experiment: int) -> FloatArray:
-        """Return the readings of one experiment; see `Machine.predict`."""
-        found = self.simulate([point], [experiment])[0][experiment]
-        assert found is not None
-        return found
-
     def simulate(self, points: Sequence[Point], only: Sequence[int | None] | None = None,
                  until: float = math.inf) -> list[list[FloatArray | None]]:
         """Return the readings of several variants; see `Machine.simulate`."""

@@ -20,10 +20,11 @@ TEETH = 1e-3    # compliance of a gearbox in good order [rad/(N m)]
 
 
 @compiled
-def run(time: Array, reference: Array, push: Array, cascade: Cascade, rubbing: Friction,
-        constant: float, motor: float, load: float, compliance: float, half_gap: float,
-        delay: float, ripple: tuple[float, float, float], out: Array) -> None:
+def run(time: Array, reference: Array, pushes: tuple[Array, Array, Array], cascade: Cascade,
+        rubbing: Friction, constant: float, motor: float, load: float, compliance: float,
+        half_gap: float, delay: float, ripple: tuple[float, float, float], out: Array) -> None:
     """Write motor angle [rad] and current [A] at each sample into `out`."""
+    on_motor, in_gear, on_load = pushes
     q = ql = out[0, 0]
     w = wl = integral = 0.0
     place = 0
@@ -37,12 +38,14 @@ def run(time: Array, reference: Array, push: Array, cascade: Cascade, rubbing: F
         count = coupling.steps_for(step, stiffness, damping, motor, load)
         h = step / count
         for _ in range(count):
-            shaft = coupling.tooth_torque(q - ql, w - wl, half_gap, stiffness, damping)
-            driving = constant * out[k, 1] + wave(q, ripple[0], ripple[1], ripple[2]) - shaft
+            shaft = in_gear[k] + coupling.tooth_torque(
+                q - ql, w - wl, half_gap, stiffness, damping)
+            driving = (constant * out[k, 1] + on_motor[k]
+                       + wave(q, ripple[0], ripple[1], ripple[2]) - shaft)
             moving = friction.direction(w, driving)
             w = friction.rate_after(h, w, driving, friction.level(rubbing, moving, 0.0, q),
                                     friction.drag(rubbing, moving), motor)
-            wl += h * (shaft + push[k]) / load
+            wl += h * (shaft + on_load[k]) / load
             q += h * w
             ql += h * wl
 
@@ -51,7 +54,8 @@ def simulate(n: Numbers, test: OneTest) -> dict[str, Array]:
     """Return the readings, had the joint these numbers."""
     out = np.zeros((test.time.size, 2))
     out[0, 0] = n.start
-    run(test.time, test['reference_rad'], test.push['load'],
+    run(test.time, test['reference_rad'],
+        (test.push['motor'], test.push['gearbox'], test.push['load']),
         Cascade(n.position_gain, 200.0, n.velocity_gain, 0.05, 8.0),
         Friction(coulomb=n.coulomb, viscous=n.viscous, asymmetry=n.asymmetry, stribeck=n.stribeck,
                  stribeck_rate=0.5), n.torque_constant, n.motor, n.load, n.compliance, n.half_gap,
@@ -82,5 +86,7 @@ machine = own_machine(
         effect('controller.delay', cause='the bus takes time',
                delay=size(0.0, 0.02, 's', step=1e-3)),
     ],
-    push={'load': push('load', 'torque on the load', 'N m', 0.02)},
+    push={'motor': push('motor', 'torque on the motor', 'N m', 0.02),
+          'gearbox': push('gearbox', 'torque in the gear', 'N m', 0.02),
+          'load': push('load', 'torque on the load', 'N m', 0.02)},
     settles_s=0.4, blocks=('controller', 'motor', 'gearbox', 'load'), parallel=True)

@@ -18,7 +18,7 @@ from typing import Any
 from antenna_drive.emulator.wiring import TEST_SIGNAL
 from lab.bench import measuring
 from lab.bench.chromium import EXECUTABLE, Page
-from lab.campaign.domains import DomainClaim
+from lab.campaign.domains import claimed_domain
 from simgap.errors import UserError
 
 _PATIENCE_S = 120.0
@@ -52,9 +52,8 @@ def measure(repetitions: int, quick: bool, progress: Callable[[str], None]) -> d
     """
     if EXECUTABLE is None:
         raise UserError('chromium is not installed')
-    claim = DomainClaim()
-    os.environ['ROS_DOMAIN_ID'] = str(claim.number)
-    try:
+    with claimed_domain() as domain:
+        os.environ['ROS_DOMAIN_ID'] = str(domain)
         progress('start')
         result: dict[str, Any] = {'first_curve_s': measuring.figure(
             [_first_curve() for _ in range(2 if quick else repetitions)], 's')}
@@ -64,8 +63,6 @@ def measure(repetitions: int, quick: bool, progress: Callable[[str], None]) -> d
         for name, pace in (('rate_share_paced', 1.0), ('rate_share', 0.0)):
             progress(f'rate at pace {pace:g}')
             result[name] = _rate_share(pace, 5.0 if quick else 20.0, 2 if quick else repetitions)
-    finally:
-        claim.release()
     return result
 
 

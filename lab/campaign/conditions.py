@@ -20,7 +20,7 @@ from antenna_drive.emulator.wiring import UNITS
 from antenna_drive.lockstep.member import DECEIVED_STANDSTILL_S
 from antenna_drive.lockstep.report import CUT_OFF
 from antenna_drive.recording.bag_reader import read_bag
-from lab.campaign.domains import DomainClaim
+from lab.campaign.domains import claimed_domain
 from lab.campaign.rig import (
     Diagnostics, InVainError, MEMBERS, OBSERVER, random_settings, RECORDER, Rig,
 )
@@ -237,7 +237,7 @@ def _many_drives(outcome: Outcome, options: Mapping[str, Any], rng: random.Rando
         rigs: list[Rig] = []
         for number in range(options['drives']):
             if number % DRIVES_PER_DOMAIN == 0:
-                os.environ['ROS_DOMAIN_ID'] = str(ending.enter_context(DomainClaim()).number)
+                os.environ['ROS_DOMAIN_ID'] = str(ending.enter_context(claimed_domain()))
                 said = Diagnostics()
                 ending.callback(said.close)
             rigs.append(ending.enter_context(Rig(

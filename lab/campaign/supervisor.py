@@ -22,7 +22,7 @@ from typing import Any
 
 from antenna_drive.workers import workers
 from lab.campaign import leftovers
-from lab.campaign.domains import DomainClaim
+from lab.campaign.domains import claimed_domain
 from lab.campaign.trials import Outcome, SIDE_BY_SIDE, Trial
 from simgap.errors import UserError
 
@@ -91,12 +91,12 @@ class Campaign:
         seed = trial.seed(self.settings['seed'])
         token = f'{os.getpid()}-{time.time_ns()}'
         began = time.monotonic()
-        with DomainClaim() as domain, tempfile.TemporaryDirectory() as folder:
+        with claimed_domain() as domain, tempfile.TemporaryDirectory() as folder:
             target = Path(folder, 'outcome.json')
             process = subprocess.Popen(
                 [sys.executable, '-W', 'ignore', '-m', 'lab.campaign', trial.part,
                  trial.name, str(seed), json.dumps(dict(trial.options)), str(target)],
-                env={**os.environ, leftovers.TOKEN: token, 'ROS_DOMAIN_ID': str(domain.number)},
+                env={**os.environ, leftovers.TOKEN: token, 'ROS_DOMAIN_ID': str(domain)},
                 stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
                 start_new_session=True)
             outcome = Outcome()

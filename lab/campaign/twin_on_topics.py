@@ -22,7 +22,7 @@ from antenna_drive.lockstep.entry import choose_transport
 from antenna_drive.readings import RATE_COMMAND
 from antenna_drive.recording.csv_format import write_csv
 from antenna_drive.twin.watch import GAP
-from lab.campaign.domains import DomainClaim
+from lab.campaign.domains import claimed_domain
 from lab.campaign.rig import Diagnostics, PATIENCE_S, Said
 from lab.campaign.twin_proving import recording_of
 from simgap.logs.channel import NANOSECONDS
@@ -112,8 +112,8 @@ def _own_domain() -> Iterator[None]:
     """Put this process, and what it starts, into a ROS 2 domain that nobody else uses."""
     before = dict(os.environ)
     choose_transport(os.environ)
-    with DomainClaim() as claim:
-        os.environ['ROS_DOMAIN_ID'] = str(claim.number)
+    with claimed_domain() as domain:
+        os.environ['ROS_DOMAIN_ID'] = str(domain)
         try:
             yield
         finally:

@@ -62,14 +62,19 @@ LARGEST_TOLERANCE = 0.05
 USUAL_TOLERANCE = 0.02
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options of `lab trial`."""
+def add_sealed_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options of every sealed trial: how many cases, which ones, and where to."""
     parser.add_argument('--cases', type=int, required=True, metavar='N', help='number of cases')
     parser.add_argument('--seed', type=int, required=True, metavar='S',
                         help='seed of the cases; for a published figure use one that nothing '
                              'was tuned on')
     parser.add_argument('--out', type=Path, required=True, metavar='DIR',
                         help='folder of the trial')
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options of `lab trial`."""
+    add_sealed_options(parser)
     parser.add_argument('--machine', action='append', choices=('antenna', *MACHINES),
                         help='machine of the cases (default: antenna); joint and axis may be '
                              'given both, and take turns')

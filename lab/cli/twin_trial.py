@@ -26,13 +26,13 @@ import argparse
 from collections.abc import Mapping, Sequence
 from functools import partial
 import os
-from pathlib import Path
 from statistics import median
 from typing import Any
 
 from antenna_drive.cli.options import add_worker_options
 from antenna_drive.emulator.unit import FloatArray
 from lab.antenna import cases
+from lab.cli.trial import add_sealed_options
 from lab.trials import onset, sealing
 from lab.trials.driver import Arm, complete
 from lab.trials.results import TrialResults
@@ -57,12 +57,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options of `lab twin-trial`."""
     parser.add_argument('--kind', choices=('onset', 'healthy', 'verdict'), required=True,
                         help='what happens in the tests')
-    parser.add_argument('--cases', type=int, required=True, metavar='N', help='number of cases')
-    parser.add_argument('--seed', type=int, required=True, metavar='S',
-                        help='seed of the cases; for a published figure use one that nothing '
-                             'was tuned on')
-    parser.add_argument('--out', type=Path, required=True, metavar='DIR',
-                        help='folder of the trial')
+    add_sealed_options(parser)
     parser.add_argument('--duration', type=float, default=3600.0, metavar='S',
                         help='length of a healthy test [s] (default: %(default)g)')
     parser.add_argument('--alarms-per-day', type=float, default=1.0, metavar='N',

@@ -85,13 +85,15 @@ class Machine(ABC):
         self.nuisances = nuisances if isinstance(nuisances, Nuisances) else Nuisances(nuisances)
         self.catalogue = effects if isinstance(effects, Catalogue) else Catalogue(effects)
 
-    @abstractmethod
     def predict(self, point: Point, experiment: int) -> FloatArray:
         """
         Return the readings of an experiment, shape (n, c); not finite where the run diverged.
 
-        `point` has values by name. Others are zero; shape parameters not named do nothing.
+        `point` has values by name. Others are zero, shapes do nothing. Override it or `simulate`.
         """
+        found = self.simulate([point], [experiment])[0][experiment]
+        assert found is not None
+        return found
 
     def simulate(self, points: Sequence[Point], only: Sequence[int | None] | None = None,
                  until: float = math.inf) -> list[list[FloatArray | None]]:
@@ -189,11 +191,6 @@ class Wrapped(Machine):
     @abstractmethod
     def around(self, inner: Machine) -> Machine:
         """Return the same around another inner machine."""
-
-    def predict(self, point: Point, experiment: int) -> FloatArray:
-        found = self.simulate([point], [experiment])[0][experiment]
-        assert found is not None
-        return found
 
     @property
     def time_scales(self) -> TimeScales:

@@ -35,9 +35,6 @@ class Part(Machine):
     def time_scales(self) -> TimeScales:
         return self._machine.time_scales
 
-    def predict(self, point: Point, experiment: int) -> FloatArray:
-        return self._machine.predict({**self._held, **point}, self.chosen[experiment])
-
     def simulate(self, points: Sequence[Point], only: Sequence[int | None] | None = None,
                  until: float = math.inf) -> list[list[FloatArray | None]]:
         wanted = [(i, k) for i, one in enumerate(only or [None] * len(points))

@@ -5,9 +5,9 @@ A law as a hypothesis: it acts in the simulation, and is judged as an effect of 
 
 A function that the machine's own equations have room for acts within the loop: a friction that it
 adds can stick. It is fitted as an effect is, beside the best hypothesis and beside none. Any other
-law is a course of an input, computed again from the motion that it makes. It is fitted at noise
-that is white, because slow noise takes a gap for its own. Then law and best are compared at the
-noise that the better of them leaves.
+law is a course of an input, computed again from the motion that it makes, and fitted at white
+noise, because slow noise takes a gap for its own. The one that fits best is compared with the best
+hypothesis at the noise that the better of them leaves.
 """
 
 from __future__ import annotations
@@ -35,8 +35,10 @@ from simgap.verdict.unknown_input import Place, readings_of
 
 # A law moves the machine, and so what it is a function of.
 _ROUNDS = 2
-# So many of the likeliest laws within the loop are fitted beside each.
+# So many of the likeliest laws are fitted beside each hypothesis.
 _FITTED = 2
+
+_Tried = tuple[Machine, Place, Hypothesis]  # a law that was fitted, as the last effect
 
 
 @dataclass(frozen=True)
@@ -52,11 +54,12 @@ class LawfulFit:
 
 def lawful_fit(found: Found, places: Sequence[Place], threads: int = 1) -> LawfulFit | None:
     """Return the likeliest law of all places, in the fit; None if none promises its price."""
-    settings = found.problem.settings
-    begun = _learnt(found) if found.problem.machine.learnable else _entering(found, places)
-    if begun is None:
+    settings, price = found.problem.settings, found.evidence.price
+    tried = _learnt(found) if found.problem.machine.learnable else _entering(found, places)
+    best = min(tried, key=lambda law: law[2].cost + price(law[2].forms), default=None)
+    if best is None:
         return None
-    machine, place, law = begun
+    machine, place, law = best
     # all are compared at the noise that the law leaves, with the error that every model has
     left = with_noise_left(machine, law.state.point(), settings.noise,
                            settings.noise.greatest_level)
@@ -64,6 +67,9 @@ def lawful_fit(found: Found, places: Sequence[Place], threads: int = 1) -> Lawfu
         left.experiments, settings.noise)), settings=settings)
     law = replace(law, state=problem.fit(problem.start(
         law.state.parameters, law.state.point()), settings.search.iterations))
+    for effect in law.effects[:-1]:  # what the law does is not done again
+        law = max((law, moves.dropped(problem, law, effect)),
+                  key=Evidence.among(problem, [law])).with_jacobian(problem)
     slopes = law.state.jacobian[:, :len(problem.machine.nuisances)]
     rivals = [moves.refitted(problem, h, law, slopes) for h in (
         [found.best, found.none] if found.best.effects else [found.best])]
@@ -104,43 +110,43 @@ def _promised(problem: LeastSquares, base: Hypothesis,
                         effect.id, replace(form, parameters=numbers), columns)
 
 
-def _learnt(found: Found) -> tuple[Machine, Place, Hypothesis] | None:
-    """Return the law that fits best, beside the best hypothesis or none; None if none pays."""
-    problem, evidence, tried, state = found.problem, found.evidence, [], found.best.state
-    hope = problem.settings.search.hope  # of the search: by how much a fit may exceed its promise
+def _learnt(found: Found) -> Iterator[_Tried]:
+    """Yield the likeliest laws within the loop, fitted beside the best hypothesis and none."""
+    problem, evidence, state = found.problem, found.evidence, found.best.state
     derivatives = [problem.jacobian(
         state.point(), item.effect.forms[0].parameters, state.residual, central=False)
         for item in problem.machine.learnable]
     for base in [found.best, found.none][:1 + bool(found.best.effects)]:
         whole = base.with_jacobian(problem)
         laws = sorted(_promised(problem, whole, derivatives), key=lambda law: -law[0].evidence)
-        behind = evidence(found.best) - evidence(base)
+        # a fit may exceed its promise, as in the search
+        least = (evidence(found.best) - evidence(base)) / problem.settings.search.hope
         for place, item in laws[:_FITTED]:
-            if place.evidence > max(evidence.price([item.form]), behind / hope):
+            if place.evidence > max(evidence.price([item.form]), least):
                 # where it is strong, its derivatives at nothing say little
                 begin = min((dict.fromkeys(item.form.start, 0.0), item.form.start),
                             key=lambda sizes: problem.loss(problem.residuals(
                                 {**whole.state.point(), **sizes})))
-                tried.append((problem.machine, place, moves.added(problem, whole, item, begin)))
-    return min(tried, key=lambda law: law[2].cost + evidence.price(law[2].forms), default=None)
+                yield problem.machine, place, moves.added(problem, whole, item, begin)
 
 
-def _entering(found: Found, places: Sequence[Place]) -> tuple[WithLaw, Place, Hypothesis] | None:
-    """Return the likeliest law of an input, beside the best hypothesis; None if none pays."""
-    place = max((place for place in places if place.law),
-                key=lambda place: place.law.evidence if place.law else 0.0, default=None)
-    if place is None or place.law is None or (
-            place.law.evidence < found.evidence.price([place.law.as_form()])):
-        return None
-    problem, law = found.problem.as_stated(), place.law
-    point = found.best.state.point()
-    problem = problem.at_noise(problem.noise_level(problem.residuals(point)))
+def _entering(found: Found, places: Sequence[Place]) -> Iterator[_Tried]:
+    """Yield the likeliest laws of inputs that pay, fitted beside the best hypothesis."""
+    problem, price = found.problem.as_stated(), found.evidence.price
+    problem = problem.at_noise(problem.noise_level(problem.residuals(found.best.state.point())))
+    laws = [(place.law, place) for place in places if place.law]
+    for law, place in sorted(laws, key=lambda item: -item[0].evidence)[:_FITTED]:
+        if law.evidence >= price([law.as_form()]):
+            yield _entered(problem, found.best, place, law)
+
+
+def _entered(problem: LeastSquares, best: Hypothesis, place: Place, law: Law) -> _Tried:
     source = next(item for item in (*problem.machine.disturbance_inputs, *readings_of(problem))
                   if item.name == place.name)
     effect = law.as_effect(source)
     form, lawful, state = effect.forms[0], problem, problem.start(
-        found.best.state.parameters, point)
-    begun, point = state, {**point, **form.start}
+        best.state.parameters, best.state.point())
+    begun, point = state, {**state.point(), **form.start}
     for _ in range(_ROUNDS):
         machine = WithLaw(problem.machine, effect, source, [
             own / source.size for own in law.weights(quantities_of(
@@ -153,7 +159,7 @@ def _entering(found: Found, places: Sequence[Place]) -> tuple[WithLaw, Place, Hy
             np.column_stack([begun.jacobian, columns])), problem.settings.search.iterations)
         point = state.point()
     return machine, place, Hypothesis(
-        (*found.best.effects, effect.id), (*found.best.forms, form), state)
+        (*best.effects, effect.id), (*best.forms, form), state)
 
 
 def _as_fitted(law: Law, found: Hypothesis, machine: Machine, gained: float,

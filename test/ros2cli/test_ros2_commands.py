@@ -16,7 +16,7 @@ import sys
 import time
 
 from installations import Installation
-from lab.campaign.domains import DomainClaim
+from lab.campaign.domains import claimed_domain
 import pytest
 
 pytestmark = pytest.mark.slow
@@ -108,9 +108,8 @@ def shell(request: pytest.FixtureRequest) -> Iterator[Shell]:
     pytest.importorskip('rclpy', reason='ROS 2 is not installed')
     if ROS2 is None:
         pytest.skip('the ros2 command line is not installed')
-    claim = DomainClaim()
-    yield Shell(request.getfixturevalue(f'{request.param}_installation'), claim.number)
-    claim.release()
+    with claimed_domain() as domain:
+        yield Shell(request.getfixturevalue(f'{request.param}_installation'), domain)
 
 
 @pytest.fixture(scope='module')

@@ -25,12 +25,13 @@ GEAR = 30.0
 
 
 @compiled
-def run(reference: Array, ticks: int, push: Array, cascade: Cascade, rubbing: Friction,
-        bodies: tuple[float, float, float], shaft: tuple[float, float, float],
+def run(reference: Array, ticks: int, pushes: tuple[Array, Array, Array], cascade: Cascade,
+        rubbing: Friction, bodies: tuple[float, float, float], shaft: tuple[float, float, float],
         hung: tuple[float, float], constant: float, lag: float, delay: float,
         ripple: Wave, weight: tuple[float, float], cyclic: Wave, integral: float, q: float,
         out: Array) -> None:
     """Write motor angle [rad] and current [A] at each tick into `out`."""
+    on_motor, in_shaft, on_load = pushes
     motor, load, third = bodies
     stiffness, damping, half_gap = shaft
     ql = qh = q
@@ -52,13 +53,15 @@ def run(reference: Array, ticks: int, push: Array, cascade: Cascade, rubbing: Fr
         for _ in range(PARTS):
             current, flowing = shaping.lagged_mean(flowing, demand, lag, h)
             q, ql, qh = q + 0.5 * h * w, ql + 0.5 * h * wl, qh + 0.5 * h * wh
-            twisting = coupling.tooth_torque(q - ql, w - wl, half_gap, stiffness, damping)
+            twisting = in_shaft[row] + coupling.tooth_torque(
+                q - ql, w - wl, half_gap, stiffness, damping)
             holding = hung[0] * (ql - qh) + hung[1] * (wl - wh)
-            driving = constant * current + harmonics(q, ripple[0], ripple[1]) - twisting
+            driving = (constant * current + on_motor[row] + harmonics(q, ripple[0], ripple[1])
+                       - twisting)
             moving = friction.direction(w, driving)
             w = friction.rate_after(h, w, driving, friction.level(rubbing, moving, 0.0, q),
                                     friction.drag(rubbing, moving), motor)
-            wl += h * (twisting + push[row] - holding
+            wl += h * (twisting + on_load[row] - holding
                        + wave(ql / GEAR, 1.0, weight[0], weight[1])) / load
             if third > 0.0:
                 wh += h * holding / third
@@ -72,7 +75,7 @@ def simulate(n: Numbers, test: OneTest) -> dict[str, Array]:
     out = np.zeros(((time.size - 1) * ticks + 1, 2))
     third = n.hung_share * n.load * (1.0 + n.load_change)
     turn = 2.0 * math.pi * n.hung_hz
-    run(reference, ticks, test.push['load'],
+    run(reference, ticks, (test.push['motor'], test.push['gearbox'], test.push['load']),
         Cascade(20.0, 200.0, 0.4, 0.1, 8.0 * (1.0 + n.limit_change)),
         Friction(coulomb=n.coulomb * n.coulomb_share, viscous=n.viscous * n.viscous_share,
                  asymmetry=n.asymmetry,
@@ -136,6 +139,8 @@ machine = own_machine(
         ripple('encoder.cyclic_error', 'cyclic', size(-0.2, 0.2, 'rad'), 'motor_rad',
                orders=(1.0, 2.0), harmonics=2, cause='the encoder sits off its axis'),
     ],
-    push={'load': push('load', 'torque on the load', 'N m', 0.02)},
+    push={'motor': push('motor', 'torque on the motor', 'N m', 0.02),
+          'gearbox': push('gearbox', 'torque in the shaft', 'N m', 0.02),
+          'load': push('load', 'torque on the load', 'N m', 0.02)},
     settles_s=0.3, judged_hz=100.0, blocks=('controller', 'motor', 'gearbox', 'load', 'link'),
     parallel=True, log=lambda log: without_gaps(log, ['reference_rad'], settles_s=0.5))
