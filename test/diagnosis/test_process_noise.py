@@ -4,8 +4,10 @@
 
 import numpy as np
 import pytest
+from simgap.fit.least_squares import LeastSquares
 from simgap.fit.process_noise import ProcessNoise, without_process
-from simgap.machine.contract import Experiment, FloatArray
+from simgap.fit.starts import least_cost
+from simgap.machine.contract import Experiment, FloatArray, Machine, Parameter, Point
 from simgap.machine.responses import ProcessResponses, Responses
 
 COUNT, WIDTH = 60, 9
@@ -58,3 +60,26 @@ def test_without_a_process_nothing_is_taken_away() -> None:
     experiment = Experiment('test', np.arange(0.0, 3.0), ('a',), ('1',), ones, ones)
     residual = np.array([[1.0], [2.0], [np.nan]])
     assert without_process(experiment, residual, 5.0) is residual
+
+
+class Slope(Machine):
+    """Two readings that grow with time."""
+
+    def predict(self, point: Point, experiment: int) -> FloatArray:
+        return np.outer(self.experiments[experiment].time, [point['slope'], 1.0])
+
+
+@pytest.mark.parametrize('until', [8.0, 17.0, 1e9])
+def test_what_was_not_simulated_does_not_count_whatever_the_process_does(until: float) -> None:
+    """The cost is about half the number of samples, with the right slope, and more without."""
+    time, noise = np.arange(0.0, COUNT // 2), np.full((COUNT // 2, 2), 0.05)
+    random = np.random.default_rng(3)
+    measured = np.outer(time, [0.3, 1.0]) + noise * random.normal(size=noise.shape) + 0.05 * (
+        columns() @ ROOT @ random.normal(size=5)).reshape(noise.shape)
+    experiment = Experiment('test', time, ('a', 'b'), ('1', '1'), measured, noise,
+                            process=ProcessResponses([PULSES], 0.05 * ROOT, 0.0 * noise))
+    problem = LeastSquares(Slope([experiment], [Parameter('slope', '1/s', -1.0, 1.0, 0.01)]))
+    trials = [{'slope': value} for value in (0.2, 0.25, 0.3, 0.35, 0.4)]
+    cost, point = least_cost(problem, trials, 0, until)
+    assert point == {'slope': 0.3}
+    assert cost < COUNT
