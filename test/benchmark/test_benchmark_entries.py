@@ -13,8 +13,9 @@ from typing import Any
 
 from lab.benchmark.cases import draw_truths, PRACTICE
 from lab.benchmark.entries import answered, enter, table
+from lab.benchmark.methods.ours import WIND
 from lab.cli import main
-from lab.joints.machines import kind_of
+from lab.joints.machines import BENCHMARK, kind_of
 from lab.trials import batch, sealing
 from lab.trials.held_back import closed_fraction, noise_power
 from lab.trials.scorecard import Case, score
@@ -22,6 +23,7 @@ from lab.trials.scored_cases import read_scored
 import numpy as np
 import pytest
 from simgap.errors import UserError
+from simgap.model import load_model
 
 COUNT = 12
 # Writes the verdict of its case from a file beside it, and notes that it was there.
@@ -226,3 +228,10 @@ def test_the_notebook_quotes_its_published_cases(name: str, singles: int, pairs:
         low, high = figures['ci95'][figure]
         assert f'{figures[figure]:.2f} ({low:.2f} to {high:.2f})' in text
     assert f'{figures["auroc_unknown"]:.2f} (' in text
+
+
+@pytest.mark.parametrize('machine', BENCHMARK)
+def test_our_entry_states_the_wind_where_the_task_says_that_it_acts(machine: str) -> None:
+    """On the last body, and nowhere else."""
+    places = load_model(kind_of(machine).model).push
+    assert [name for name in places if name in WIND] == list(places)[-1:]

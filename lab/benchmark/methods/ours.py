@@ -14,7 +14,7 @@ WIND = {'load': 1.5e-3, 'carriage': 1.0}
 def main(case: CaseFolder) -> None:
     """Diagnose a case with a user's model, and predict its kept test."""
     model = replace(case.model, push={
-        name: replace(place, everyday=WIND[name] / 3.0 ** 0.5)
+        name: replace(place, everyday=WIND.get(name, 0.0) / 3.0 ** 0.5)
         for name, place in case.model.push.items()})
     verdict = diagnose_logs(model, case.logs, threads=1)
     data = verdict.as_data()
