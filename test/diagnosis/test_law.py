@@ -193,6 +193,21 @@ def test_a_law_gains_more_than_an_error_of_form_of_what_is_named(cubic: float,
     assert (fit is not None and fit.gained > 0.0) == told
 
 
+def test_of_two_places_the_one_whose_law_fits_better_counts() -> None:
+    """Whichever promises more: a force of the spring, or a reading that is off by the angle."""
+    problem = LeastSquares(Swing(lambda angle: -4.0 * angle ** 3))
+    none = Hypothesis((), (), problem.fit(problem.start(problem.machine.nuisances, {}), 5))
+    found = Found(problem, [none], Evidence.among(problem, [none]))
+    promised = [place for place in places(problem, none.state.point(), problem) if place.law]
+    assert {place.component for place in promised} == {'mass', 'angle'}
+    for first in promised:
+        evidence = [1e4 if place is first else 9e3 for place in promised]
+        fit = lawful_fit(found, [replace(place, law=replace(place.law, evidence=value))
+                                 for place, value in zip(promised, evidence, strict=True)
+                                 if place.law])
+        assert fit is not None and fit.place.component == 'mass'
+
+
 def test_a_law_acts_in_the_simulation() -> None:
     """A force against the motion that it makes: the curve is the one that the machine has."""
     fit = lawful(Swing(lambda angle: -4.0 * angle ** 3))
