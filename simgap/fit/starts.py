@@ -32,8 +32,7 @@ def least_cost(problem: LeastSquares, trials: Sequence[dict[str, float]], experi
         results = problem.machine.simulate(part, [experiment] * len(part), until)
         for trial, result in zip(part, results, strict=True):
             # later rows, which were not simulated, would pass for the greatest of process noise
-            assert (own := result[experiment]) is not None
-            seen = np.where(early, own, here.measured)
+            seen = np.where(early, np.asarray(result[experiment]), here.measured)
             if (cost := problem.loss(problem.standardised(experiment, seen))) < least:
                 best, least = trial, cost
     return least, best
