@@ -31,7 +31,7 @@ def least_cost(problem: LeastSquares, trials: Sequence[dict[str, float]], experi
         part = trials[first:first + chunk]
         results = problem.machine.simulate(part, [experiment] * len(part), until)
         for trial, result in zip(part, results, strict=True):
-            # later rows, which were not simulated, would pass for the greatest of process noise
+            # a row that was not simulated counts as measured; whitening would spread its NaN
             seen = np.where(early, np.asarray(result[experiment]), here.measured)
             if (cost := problem.loss(problem.standardised(experiment, seen))) < least:
                 best, least = trial, cost

@@ -89,7 +89,7 @@ class Machine(ABC):
         """
         Return the readings of an experiment, shape (n, c); not finite where the run diverged.
 
-        `point` has values by name. Others are zero, shapes do nothing. Override it or `simulate`.
+        `point` has values by name. Others are zero. A machine defines this method or `simulate`.
         """
         found = self.simulate([point], [experiment])[0][experiment]
         assert found is not None

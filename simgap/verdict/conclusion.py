@@ -55,10 +55,11 @@ def concluded(machine: Machine, progress: Callable[[float, str], None], threads:
     decision = verdict.decide(found, places, law.gained if law else -math.inf,
                               enough(found.problem))
     if law and law.gained > 0.0:
-        # a course over time may be anything: where a law holds, places are weighed by their laws
+        # a course over time may be anything: places are weighed by laws, below the one that fits
         places = [law.place, *sorted(
-            (replace(place, evidence=place.law.evidence, law=None) for place in places
-             if place.law and place.name != law.place.name), key=lambda place: -place.evidence)]
+            (replace(place, evidence=min(place.law.evidence, law.place.evidence), law=None)
+             for place in places if place.law and place.name != law.place.name),
+            key=lambda place: -place.evidence)]
     elif decision.unknown >= settings.verdict.partly:
         # a place is not to blame for what pulses cannot follow, nor for more than its everyday
         machine = machine.with_experiments([replace(e, process=None) for e in machine.experiments])

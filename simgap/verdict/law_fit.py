@@ -68,8 +68,7 @@ def lawful_fit(found: Found, places: Sequence[Place], threads: int = 1) -> Lawfu
     law = replace(law, state=problem.fit(problem.start(
         law.state.parameters, law.state.point()), settings.search.iterations))
     for effect in law.effects[:-1]:  # what the law does is not done again
-        law = max((law, moves.dropped(problem, law, effect)),
-                  key=Evidence.among(problem, [law])).with_jacobian(problem)
+        law = max((law, moves.dropped(problem, law, effect)), key=Evidence.among(problem, [law]))
     slopes = law.state.jacobian[:, :len(problem.machine.nuisances)]
     rivals = [moves.refitted(problem, h, law, slopes) for h in (
         [found.best, found.none] if found.best.effects else [found.best])]
@@ -141,6 +140,7 @@ def _entering(found: Found, places: Sequence[Place]) -> Iterator[_Tried]:
 
 
 def _entered(problem: LeastSquares, best: Hypothesis, place: Place, law: Law) -> _Tried:
+    """Return a law of an input, fitted beside the best hypothesis."""
     source = next(item for item in (*problem.machine.disturbance_inputs, *readings_of(problem))
                   if item.name == place.name)
     effect = law.as_effect(source)

@@ -16,7 +16,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 HOUSES = ('simgap', 'antenna_drive', 'lab')
 # Lines of Python: what a user installs, and the parts of it.
-INSTALLED, ENGINE, LABORATORY = 42_000, 15_376, 15_973
+INSTALLED, ENGINE, LABORATORY = 42_000, 15_377, 15_973
 FILE, FUNCTION, README, PAGE, DECISION_WORDS = 400, 60, 200, 300, 80
 
 LONG_FILES: dict[str, int] = {}

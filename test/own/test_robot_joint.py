@@ -69,6 +69,9 @@ def test_a_law_in_the_place_of_what_the_list_lacks_predicts_a_log_that_it_never_
     """As well as the true effect would; the logs have noise of 0.02 A."""
     found = diagnose_logs(MODEL, logs_of('asymmetry'), without=['motor.friction_asymmetry'])
     assert found.word == 'unknown_effect' and found.lawful is not None
+    # what is said first is the place of the law, whatever was promised elsewhere
+    assert found.where[0]['component'] == found.may_enter_at[0].component
+    assert found.may_enter_at[0].law is not None
     for log in logs_with(MAKER['FAULTS']['asymmetry'], 7):
         current = unseen(found, log)['current']
         assert current.after > 0.07 and current.lawful == pytest.approx(0.02, rel=0.1)
