@@ -15,12 +15,13 @@ from simgap.machine.with_law import walk
 
 # An outlier of a reading has not been reached.
 _ENDS = (0.002, 0.998)
-# Of a motor: the function, what it depends on with its unit, the readings that tell it.
-_OF_A_MOTOR = (('friction_by_rate', 'rate', 'rad/s', 'tach'),
-               ('friction_by_load', 'gear torque', 'N m', 'current'),
-               ('torque_by_current', 'current', 'article A', 'current'))
-# What moves the drive a little, of a motor and of the axis [N m].
-_OF_MOTOR, _OF_AXIS = 0.05, 2e3
+# What moves the drive a little: a torque of a motor, one of the axis, a current of an amplifier.
+_OF_MOTOR, _OF_AXIS, _CURRENT = (0.05, 'N m'), (2e3, 'N m'), (0.01, 'article A')
+# Of a motor: the function, its step, what it depends on with its unit, and readings that tell it.
+_OF_A_MOTOR = (('motor.friction_by_rate', _OF_MOTOR, 'rate', 'rad/s', 'tach'),
+               ('motor.friction_by_load', _OF_MOTOR, 'gear torque', 'N m', 'current'),
+               ('motor.torque_by_current', _OF_MOTOR, 'current', 'article A', 'current'),
+               ('amplifier.current_by_demand', _CURRENT, 'demand', 'article A', 'current'))
 
 
 def learnable(tests: Sequence[FieldTest], predicted: Sequence[FloatArray],
@@ -33,28 +34,32 @@ def learnable(tests: Sequence[FieldTest], predicted: Sequence[FloatArray],
         return np.nanquantile(np.concatenate(seen), _ENDS).tolist()
 
     for component, motors in MOTORS.items():
-        for function, by, unit, reading in _OF_A_MOTOR:
+        for function, step, by, unit, reading in _OF_A_MOTOR:
             per = drive.motor_1.motor.torque_constant if by == 'gear torque' else 1.0
             ends = [end for motor in motors for end in reached(f'{reading}_{motor[-1]}')]
             whose = f'of {component}'.replace('_', ' ').replace('motors', 'both motors')
-            yield _law(component, whose, function, by, unit, None, per * max(map(abs, ends)), [
-                f'{motor}.motor.{function}' for motor in motors])
+            yield _law(component, whose, step, by, unit, None, per * max(map(abs, ends)), [
+                f'{motor}.{function}' for motor in motors])
+    for m in (1, 2):
+        most = drive.motor_1.motor.torque_constant * max(map(abs, reached(f'current_{m}')))
+        yield _law(f'gearbox_{m}', f'of gearbox {m}', _OF_MOTOR, 'gear torque', 'N m', None, most,
+                   [f'motor_{m}.gearbox.torque_by_load'])
     most = max(map(abs, reached('tach_1'))) / drive.plant.axis.gear_ratio
-    yield _law('axis', 'of the axis', 'friction_by_rate', 'rate', 'rad/s', None, most,
+    yield _law('axis', 'of the axis', _OF_AXIS, 'rate', 'rad/s', None, most,
                ['plant.axis.friction_by_rate'])
     low, high = reached('encoder', turned=1.0)
-    yield _law('axis', 'on the axis', 'torque_by_angle', 'angle', 'rad', 0.5 * (low + high),
+    yield _law('axis', 'on the axis', _OF_AXIS, 'angle', 'rad', 0.5 * (low + high),
                0.5 * (high - low), ['plant.axis.torque_by_angle'])
 
 
-def _law(component: str, whose: str, function: str, by: str, unit: str,
+def _law(component: str, whose: str, step: tuple[float, str], by: str, unit: str,
          middle: float | None, reach: float, paths: Sequence[str]) -> Learnable:
+    function = paths[0].rpartition('.')[2]
     key, at = f'{component}.{function}', (middle or 0.0) + np.linspace(-reach, reach, LAW_PLACES)
     return Learnable(
         Effect(key, component, f'{function.partition("_")[0]} {whose}', (Form(by, tuple(
-            AntennaParameter(f'{key}.{k}', 'N m', -1e8, 1e8,
-                             _OF_AXIS if component == 'axis' else _OF_MOTOR,
-                             modifier=Tabled(tuple(np.flatnonzero(step)), middle, reach,
+            AntennaParameter(f'{key}.{k}', step[1], -1e8, 1e8, step[0],
+                             modifier=Tabled(tuple(np.flatnonzero(steps)), middle, reach,
                                              tuple(paths)))
-            for k, step in enumerate(walk(LAW_PLACES).T)), scanned=True),)),
+            for k, steps in enumerate(walk(LAW_PLACES).T)), scanned=True),)),
         by, unit, tuple(at.tolist()))

@@ -31,10 +31,10 @@ _PHASE = ('rad', -2.0 * math.pi, 2.0 * math.pi)
 LAW_PLACES = 13
 
 
-def _law(description: str) -> Any:
+def _law(description: str, unit: str = 'N m') -> Any:
     """Declare the values of a learnt function."""
     return option((0.0,) * LAW_PLACES, Entry(
-        'N m', -1e8, 1e8, description, lengths=(LAW_PLACES, LAW_PLACES)))
+        unit, -1e8, 1e8, description, lengths=(LAW_PLACES, LAW_PLACES)))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,6 +66,9 @@ class Amplifier:
         0.0, 'V', 0.0, 1.0, 'half the width within which amplifier 1 does not answer')
     delay: float = effect(
         0.0, 's', 0.0, 0.1, 'time by which the rate error comes late, to first order')
+    learnt: float = effect(0.0, '1', 0.0, 1.0, 'share of the learnt function that acts')
+    current_by_demand: tuple[float, ...] = _law('further current, by demand', 'article A')
+    current_by_demand_reach: float = effect(1.0, 'article A', 1e-9, 1e4, 'of its last value')
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -149,6 +152,9 @@ class Gearbox:
     transmission_error_second_phase: float = effect(0.0, *_PHASE, 'phase of that harmonic')
     transmission_error_third: float = effect(0.0, 'rad', 0.0, 1.0, 'its third harmonic')
     transmission_error_third_phase: float = effect(0.0, *_PHASE, 'phase of that harmonic')
+    learnt: float = effect(0.0, '1', 0.0, 1.0, 'share of the learnt function that acts')
+    torque_by_load: tuple[float, ...] = _law('further torque of teeth, by what they carry')
+    torque_by_load_reach: float = effect(1.0, 'N m', 1e-9, 1e4, 'torque of its last value')
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,6 +10,7 @@ companion papers.
 """
 
 from antenna_drive.parameters.sets import Amplifier, Armature
+from antenna_drive.physics.table import tabled
 from simgap.laws.compiling import inner
 
 
@@ -53,9 +54,12 @@ def limit_centre(rate: float, p: Amplifier, armature: Armature) -> float:
 
 
 @inner
-def limited(demand: float, centre: float, current_limit: float) -> float:
-    """Return the demand kept within the current limit about `centre`; all in article A."""
-    return min(max(demand, centre - current_limit), centre + current_limit)
+def limited(demand: float, centre: float, current_limit: float, p: Amplifier) -> float:
+    """Return the demand within its limit about `centre`, with what was learnt; in article A."""
+    kept = min(max(demand, centre - current_limit), centre + current_limit)
+    if p.learnt != 0.0:
+        kept += p.learnt * tabled(kept - centre, p.current_by_demand_reach, p.current_by_demand)
+    return kept
 
 
 # What the integral of amplifier 1 does: it integrates; it stands still while the demand is beyond

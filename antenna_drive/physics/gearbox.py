@@ -4,6 +4,7 @@
 
 from antenna_drive.parameters.sets import Gearbox
 from antenna_drive.physics.harmonics import wave, wave_slope
+from antenna_drive.physics.table import tabled
 from simgap.laws.backlash import contact_torque
 from simgap.laws.compiling import inner
 
@@ -17,14 +18,10 @@ def twist(motor_angle: float, axis_angle: float, gear_ratio: float, p: Gearbox) 
     gear_ratio : N [1]
     p : Gearbox; transmission_error is the unmodelled effect of eccentric or uneven teeth
     """
-    angle = motor_angle - gear_ratio * axis_angle
-    if (p.transmission_error != 0.0 or p.transmission_error_second != 0.0
-            or p.transmission_error_third != 0.0):
-        angle += wave(
-            motor_angle, p.transmission_error, p.transmission_error_second,
-            p.transmission_error_third, p.transmission_error_cycles, p.transmission_error_phase,
-            p.transmission_error_second_phase, p.transmission_error_third_phase)
-    return angle
+    return motor_angle - gear_ratio * axis_angle + wave(
+        motor_angle, p.transmission_error, p.transmission_error_second,
+        p.transmission_error_third, p.transmission_error_cycles, p.transmission_error_phase,
+        p.transmission_error_second_phase, p.transmission_error_third_phase)
 
 
 @inner
@@ -32,14 +29,10 @@ def twist_rate(
         motor_angle: float, motor_rate: float, axis_rate: float, gear_ratio: float, p: Gearbox,
 ) -> float:
     """Return the time derivative of `twist` [rad/s]; rates in rad/s, otherwise as there."""
-    rate = motor_rate - gear_ratio * axis_rate
-    if (p.transmission_error != 0.0 or p.transmission_error_second != 0.0
-            or p.transmission_error_third != 0.0):
-        rate += motor_rate * wave_slope(
-            motor_angle, p.transmission_error, p.transmission_error_second,
-            p.transmission_error_third, p.transmission_error_cycles, p.transmission_error_phase,
-            p.transmission_error_second_phase, p.transmission_error_third_phase)
-    return rate
+    return motor_rate - gear_ratio * axis_rate + motor_rate * wave_slope(
+        motor_angle, p.transmission_error, p.transmission_error_second,
+        p.transmission_error_third, p.transmission_error_cycles, p.transmission_error_phase,
+        p.transmission_error_second_phase, p.transmission_error_third_phase)
 
 
 @inner
@@ -53,9 +46,11 @@ def gear_torque(side: int, angle: float, rate: float, presliding: float, p: Gear
     p : Gearbox
     """
     torque = contact_torque(side, angle, rate, p.half_gap, p.stiffness, p.contact_damping)
-    if torque != 0.0 and (p.hysteresis != 0.0 or p.hysteresis_share != 0.0):
-        torque += (p.hysteresis + p.hysteresis_share * abs(torque)) * presliding
-        torque = max(torque, 0.0) if side > 0 else min(torque, 0.0)
+    if torque != 0.0 and (p.learnt != 0.0 or p.hysteresis != 0.0 or p.hysteresis_share != 0.0):
+        further = (p.hysteresis + p.hysteresis_share * abs(torque)) * presliding
+        if p.learnt != 0.0:
+            further += p.learnt * tabled(torque, p.torque_by_load_reach, p.torque_by_load)
+        torque = max(torque + further, 0.0) if side > 0 else min(torque + further, 0.0)
     return torque
 
 

@@ -17,6 +17,8 @@ def wave(angle: float, amplitude: float, second: float, third: float, cycles: fl
     cycles : of the first harmonic per revolution
     phase, second_phase, third_phase : of the harmonics at angle zero [rad]
     """
+    if amplitude == 0.0 and second == 0.0 and third == 0.0:
+        return 0.0
     turned = cycles * angle
     return (amplitude * sine(turned + phase)
             + second * sine(2.0 * turned + second_phase)
@@ -27,6 +29,8 @@ def wave(angle: float, amplitude: float, second: float, third: float, cycles: fl
 def wave_slope(angle: float, amplitude: float, second: float, third: float, cycles: float,
                phase: float, second_phase: float, third_phase: float) -> float:
     """Return the derivative of `wave` by the angle, per rad; everything as there."""
+    if amplitude == 0.0 and second == 0.0 and third == 0.0:
+        return 0.0
     turned = cycles * angle
     return cycles * (amplitude * cosine(turned + phase)
                      + 2.0 * second * cosine(2.0 * turned + second_phase)

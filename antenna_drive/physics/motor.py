@@ -18,11 +18,10 @@ def driving_torque(current: float, angle: float, p: Motor) -> float:
     angle : of the rotor [rad]
     p : Motor; torque_ripple is the unmodelled effect of a rotor with poles and slots
     """
-    torque = p.torque_constant * current
-    if p.torque_ripple != 0.0 or p.torque_ripple_second != 0.0 or p.torque_ripple_third != 0.0:
-        torque += wave(angle, p.torque_ripple, p.torque_ripple_second, p.torque_ripple_third,
-                       p.torque_ripple_cycles, p.torque_ripple_phase,
-                       p.torque_ripple_second_phase, p.torque_ripple_third_phase)
+    torque = p.torque_constant * current + wave(
+        angle, p.torque_ripple, p.torque_ripple_second, p.torque_ripple_third,
+        p.torque_ripple_cycles, p.torque_ripple_phase, p.torque_ripple_second_phase,
+        p.torque_ripple_third_phase)
     if p.learnt != 0.0:
         torque += p.learnt * tabled(current, p.torque_by_current_reach, p.torque_by_current)
     return torque
@@ -58,11 +57,9 @@ def tachometer(rate: float, angle: float, p: Tachometer) -> float:
     rate, angle : of the rotor [rad/s], [rad]
     p : Tachometer; gain 1, offset 0 and ripple 0 in the article
     """
-    reading = p.gain * rate + p.offset
-    if p.ripple != 0.0 or p.ripple_second != 0.0 or p.ripple_third != 0.0:
-        reading += rate * wave(angle, p.ripple, p.ripple_second, p.ripple_third, p.ripple_cycles,
-                               p.ripple_phase, p.ripple_second_phase, p.ripple_third_phase)
-    return reading
+    return p.gain * rate + p.offset + rate * wave(
+        angle, p.ripple, p.ripple_second, p.ripple_third, p.ripple_cycles, p.ripple_phase,
+        p.ripple_second_phase, p.ripple_third_phase)
 
 
 @inner
@@ -73,15 +70,11 @@ def tachometer_slope(rate: float, angle: float, acceleration: float, p: Tachomet
     rate, angle, acceleration : of the rotor [rad/s], [rad], [rad/s^2]
     p : Tachometer
     """
-    slope = p.gain * acceleration
-    if p.ripple != 0.0 or p.ripple_second != 0.0 or p.ripple_third != 0.0:
-        slope += acceleration * wave(
-            angle, p.ripple, p.ripple_second, p.ripple_third, p.ripple_cycles,
-            p.ripple_phase, p.ripple_second_phase, p.ripple_third_phase)
-        slope += rate * rate * wave_slope(
-            angle, p.ripple, p.ripple_second, p.ripple_third, p.ripple_cycles,
-            p.ripple_phase, p.ripple_second_phase, p.ripple_third_phase)
-    return slope
+    return p.gain * acceleration + acceleration * wave(
+        angle, p.ripple, p.ripple_second, p.ripple_third, p.ripple_cycles, p.ripple_phase,
+        p.ripple_second_phase, p.ripple_third_phase) + rate * rate * wave_slope(
+            angle, p.ripple, p.ripple_second, p.ripple_third, p.ripple_cycles, p.ripple_phase,
+            p.ripple_second_phase, p.ripple_third_phase)
 
 
 @inner

@@ -130,7 +130,7 @@ def rates(
     acceleration = _acceleration(x, mode, torque, p)
     needed = _needed(t, x, u, error, acceleration, p) if mode[MODE.winding] == HELD else 0.0
     dx[STATE.integral] = integral_rate(mode[MODE.winding], error, needed, p.amplifier)
-    demand = limited(demand, centre, p.motor.current_limit)
+    demand = limited(demand, centre, p.motor.current_limit, p.amplifier)
     dx[STATE.demand] = (demand - x[STATE.demand]) / p.amplifier.lag
     dx[STATE.current] = _current_rate(x, p)
     dx[STATE.angle] = x[STATE.rate]

@@ -73,12 +73,10 @@ def _applied_torque(t: float, x: FloatArray, u: FloatArray, p: Axis) -> float:
 def _friction_level(rate: float, angle: float, p: Axis) -> float:
     """Return the size of the axis friction while it slips [N m]."""
     coulomb = p.coulomb_torque * p.friction_torque_per_ampere * p.gear_ratio
-    if (p.friction_wave != 0.0 or p.friction_wave_second != 0.0
-            or p.friction_wave_third != 0.0):
-        coulomb *= max(0.0, 1.0 + wave(
-            angle, p.friction_wave, p.friction_wave_second, p.friction_wave_third,
-            p.friction_wave_cycles, p.friction_wave_phase, p.friction_wave_second_phase,
-            p.friction_wave_third_phase))
+    coulomb *= max(0.0, 1.0 + wave(
+        angle, p.friction_wave, p.friction_wave_second, p.friction_wave_third,
+        p.friction_wave_cycles, p.friction_wave_phase, p.friction_wave_second_phase,
+        p.friction_wave_third_phase))
     dragging = drag(rate, p.viscous_friction, p.viscous_rate, p.flow_index)
     level = slip_level(rate, coulomb, dragging, p.stribeck_torque, p.stribeck_rate,
                        p.stribeck_shape, 0.0)
@@ -141,11 +139,10 @@ def encoder(angle: float, p: Encoder) -> float:
     angle : of the hub [rad]
     p : Encoder; offset, cyclic error and step are zero in the article
     """
-    reading = angle + p.offset
-    if p.cyclic_error != 0.0 or p.cyclic_error_second != 0.0 or p.cyclic_error_third != 0.0:
-        reading += wave(angle, p.cyclic_error, p.cyclic_error_second, p.cyclic_error_third,
-                        p.cyclic_error_cycles, p.cyclic_error_phase,
-                        p.cyclic_error_second_phase, p.cyclic_error_third_phase)
+    reading = angle + p.offset + wave(
+        angle, p.cyclic_error, p.cyclic_error_second, p.cyclic_error_third,
+        p.cyclic_error_cycles, p.cyclic_error_phase, p.cyclic_error_second_phase,
+        p.cyclic_error_third_phase)
     if p.step != 0.0:
         reading = p.step * math.floor(reading / p.step + 0.5)
     return reading

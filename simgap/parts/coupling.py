@@ -9,17 +9,6 @@ from simgap.laws.compiling import inner
 
 
 @inner
-def shaft_torque(twist: float, twist_rate: float, stiffness: float, damping: float) -> float:
-    """
-    Return the torque of a shaft that twists [N m].
-
-    twist, twist_rate : driving minus driven angle and rate [rad], [rad/s]
-    stiffness, damping : [N m/rad], [N m s/rad]
-    """
-    return stiffness * twist + damping * twist_rate
-
-
-@inner
 def tooth_torque(twist: float, twist_rate: float, half_gap: float, stiffness: float,
                  damping: float) -> float:
     """

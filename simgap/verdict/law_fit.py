@@ -19,7 +19,7 @@ import numpy as np
 from simgap.fit.broyden import Jacobian
 from simgap.fit.least_squares import LeastSquares
 from simgap.fit.noise import with_model_error, with_noise_left
-from simgap.machine.contract import Machine
+from simgap.machine.contract import Machine, Point
 from simgap.machine.with_law import FARTHEST, Law, WithLaw
 from simgap.search import moves
 from simgap.search.evidence import Evidence
@@ -84,11 +84,12 @@ def lawful_fit(found: Found, places: Sequence[Place], threads: int = 1) -> Lawfu
         gained, place.law, machine, law)
 
 
-def _promised(problem: LeastSquares, base: Hypothesis,
-              derivatives: Sequence[Jacobian]) -> Iterator[tuple[Place, Sensitivity]]:
-    """Yield the laws that may act beside a hypothesis, each with what its derivatives promise."""
-    evidence, count = InputEvidence.at(problem, base.state.point(), base.state.jacobian[
+def _promised(problem: LeastSquares, base: Hypothesis, point: Point,
+              derivatives: Sequence[Jacobian]) -> list[tuple[Place, Sensitivity]]:
+    """Return the laws that may act at a point of a hypothesis, the likeliest first."""
+    evidence, count = InputEvidence.at(problem, point, base.state.jacobian[
         :, :len(problem.machine.nuisances)]), len(problem.experiments)
+    laws = []
     for item, columns in zip(problem.machine.learnable, derivatives, strict=True):
         [form], effect = item.effect.forms, item.effect
         scaled = columns.astype(float) * (step := form.parameters[0].step)
@@ -104,29 +105,37 @@ def _promised(problem: LeastSquares, base: Hypothesis,
         numbers = tuple(replace(p, low=-FARTHEST * spread, high=FARTHEST * spread,
                                 step=0.1 * spread, prior_sigma=spread, start=step * factor)
                         for p, factor in zip(form.parameters, found.factors.tolist(), strict=True))
-        yield Place(effect.cause, effect.component, found.evidence,
-                    evidence.net(found.evidence), law), Sensitivity(
-                        effect.id, replace(form, parameters=numbers), columns)
+        laws.append((Place(effect.cause, effect.component, found.evidence,
+                           evidence.net(found.evidence), law),
+                     Sensitivity(effect.id, replace(form, parameters=numbers), columns)))
+    return sorted(laws, key=lambda law: -law[0].evidence)
 
 
 def _learnt(found: Found) -> Iterator[_Tried]:
-    """Yield the likeliest laws within the loop, fitted beside the best hypothesis and none."""
-    problem, evidence, state = found.problem, found.evidence, found.best.state
+    """Yield the likeliest laws within the loop, beside the best hypothesis, none, and within."""
+    problem, machine, evidence = found.problem, found.problem.machine, found.evidence
+    best = found.best.with_jacobian(problem)
+    point = best.state.point()
     derivatives = [problem.jacobian(
-        state.point(), item.effect.forms[0].parameters, state.residual, central=False)
-        for item in problem.machine.learnable]
-    for base in [found.best, found.none][:1 + bool(found.best.effects)]:
-        whole = base.with_jacobian(problem)
-        laws = sorted(_promised(problem, whole, derivatives), key=lambda law: -law[0].evidence)
+        point, item.effect.forms[0].parameters, best.state.residual, central=False)
+        for item in machine.learnable]
+    for base in [best, found.none.with_jacobian(problem)][:1 + bool(best.effects)]:
         # a fit may exceed its promise, as in the search
-        least = (evidence(found.best) - evidence(base)) / problem.settings.search.hope
-        for place, item in laws[:_FITTED]:
+        least = (evidence(best) - evidence(base)) / problem.settings.search.hope
+        for place, item in _promised(problem, base, base.state.point(), derivatives)[:_FITTED]:
             if place.evidence > max(evidence.price([item.form]), least):
                 # where it is strong, its derivatives at nothing say little
                 begin = min((dict.fromkeys(item.form.start, 0.0), item.form.start),
                             key=lambda sizes: problem.loss(problem.residuals(
-                                {**whole.state.point(), **sizes})))
-                yield problem.machine, place, moves.added(problem, whole, item, begin)
+                                {**base.state.point(), **sizes})))
+                yield machine, place, moves.added(problem, base, item, begin)
+    for effect in best.effects:  # it may be what a law of its part has done
+        gone, part = best.parameters_of([effect]), machine.catalogue[effect].component
+        rest = {name: value for name, value in point.items() if name not in gone}
+        for place, item in [law for law in _promised(problem, best, rest, derivatives)
+                            if law[0].component == part][:1]:
+            law = moves.exchanged(problem, best, effect, item.effect, item.form)
+            yield machine, place, moves.settled(problem, law, problem.settings.search.passes)
 
 
 def _entering(found: Found, places: Sequence[Place]) -> Iterator[_Tried]:

@@ -11,7 +11,7 @@ from antenna_drive.emulator.run import simulate
 from antenna_drive.parameters import load
 from antenna_drive.parameters.records import record_of
 from antenna_drive.parameters.sets import changed, LAW_PLACES
-from antenna_drive.physics.amplifier import armature_voltage
+from antenna_drive.physics.amplifier import armature_voltage, limit_centre, limited
 from antenna_drive.physics.armature import current_rate
 from antenna_drive.physics.gearbox import gear_torque, presliding_rate
 from antenna_drive.physics.harmonics import wave, wave_slope
@@ -20,6 +20,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 import numpy as np
 import pytest
+from simgap.laws.backlash import contact_side
 
 ANGLES = st.floats(-20.0, 20.0)
 
@@ -69,6 +70,40 @@ def test_gain_of_amplifier_2_acts_on_the_demand_alone() -> None:
     assert armature_voltage(0.5, 0.0, other, armature) == pytest.approx(1.1 * forward)
     assert armature_voltage(0.0, 0.5, other, armature) == armature_voltage(
         0.0, 0.5, ideal, armature)
+
+
+@given(st.floats(-4.0, 4.0), st.floats(-50.0, 50.0), st.floats(-0.3, 2.0))
+def test_a_current_that_was_learnt_is_a_winding_that_has_changed(
+        demand: float, rate: float, ohm: float) -> None:
+    drive = load().motor_1
+    whole = drive.armature.resistance + drive.amplifier.current_feedback_gain
+    # of the current that is asked for a share flows: whole / (whole + ohm)
+    table = np.linspace(-12.0, 12.0, LAW_PLACES) * -ohm / (whole + ohm)
+    amplifier, learnt = record_of(drive.amplifier)[0], record_of(replace(
+        drive.amplifier, learnt=1.0, current_by_demand=tuple(table.tolist()),
+        current_by_demand_reach=12.0))[0]
+    armature, warm = record_of(drive.armature)[0], record_of(replace(
+        drive.armature, resistance_change=ohm))[0]
+    centre = limit_centre(rate, amplifier, armature)
+    current = demand * whole / (whole + ohm)
+    for part, winding in ((amplifier, warm), (learnt, armature)):
+        asked = limited(centre + demand, centre, 5.0, part)
+        volts = armature_voltage(asked, current, part, winding)
+        assert current_rate(volts, current, rate, winding) == pytest.approx(0.0, abs=1e-6)
+
+
+@given(st.floats(-0.2, 0.2), st.floats(-5.0, 5.0), st.floats(-0.5, 2.0))
+def test_a_tooth_torque_that_was_learnt_is_a_stiffer_gearbox(
+        angle: float, rate: float, share: float) -> None:
+    gearbox = load().motor_1.gearbox
+    stiff = record_of(replace(gearbox, stiffness=(1.0 + share) * gearbox.stiffness,
+                              contact_damping=(1.0 + share) * gearbox.contact_damping))[0]
+    table = share * np.linspace(-1e5, 1e5, LAW_PLACES)
+    learnt = record_of(replace(gearbox, learnt=1.0, torque_by_load=tuple(table.tolist()),
+                               torque_by_load_reach=1e5))[0]
+    side = contact_side(angle, rate, gearbox.half_gap, gearbox.stiffness, gearbox.contact_damping)
+    assert gear_torque(side, angle, rate, 0.0, learnt) == pytest.approx(
+        gear_torque(side, angle, rate, 0.0, stiff), rel=1e-9, abs=1e-6)
 
 
 def test_current_settles_by_ohms_law_with_what_the_winding_has_become() -> None:
