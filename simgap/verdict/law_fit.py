@@ -73,13 +73,14 @@ def lawful_fit(found: Found, places: Sequence[Place], threads: int = 1) -> Lawfu
     rivals = [moves.refitted(problem, h, law, slopes) for h in (
         [found.best, found.none] if found.best.effects else [found.best])]
     evidence = Evidence.among(problem, [law, *rivals])
-    rival = max(rivals, key=evidence)
-    gained = evidence(law) - evidence(rival) - settings.evidence.shows
+    gained = evidence(law) - max(map(evidence, rivals)) - settings.evidence.shows
     withheld = held_out(problem, rivals[-1], law, threads)['explained_fraction']['value'] if (
         gained > 0.0) else None
+    # in the place of what is named it explains the gap, beside that what is left of it
+    without = rivals[0] if set(found.best.effects) < set(law.effects) else rivals[-1]
     assert place.law is not None
     return LawfulFit(replace(
-        place, evidence=place.law.evidence, explained=max(1.0 - law.cost / rival.cost, 0.0),
+        place, evidence=place.law.evidence, explained=max(1.0 - law.cost / without.cost, 0.0),
         law=_as_fitted(place.law, law, machine, gained, withheld, settings.interval)),
         gained, place.law, machine, law)
 
