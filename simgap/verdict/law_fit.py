@@ -76,7 +76,7 @@ def lawful_fit(found: Found, places: Sequence[Place], threads: int = 1) -> Lawfu
     gained = evidence(law) - max(map(evidence, rivals)) - settings.evidence.shows
     withheld = held_out(problem, rivals[-1], law, threads)['explained_fraction']['value'] if (
         gained > 0.0) else None
-    # in the place of what is named it explains the gap, beside that what is left of it
+    # beside what is named a law explains what is left of the gap, in its place the gap
     without = rivals[0] if set(found.best.effects) < set(law.effects) else rivals[-1]
     assert place.law is not None
     return LawfulFit(replace(
@@ -113,14 +113,15 @@ def _promised(problem: LeastSquares, base: Hypothesis, point: Point,
 
 
 def _learnt(found: Found) -> Iterator[_Tried]:
-    """Yield the likeliest laws within the loop, beside the best hypothesis, none, and within."""
+    """Yield the likeliest laws within the loop: beside the best and none, and for its effects."""
     problem, machine, evidence = found.problem, found.problem.machine, found.evidence
     best = found.best.with_jacobian(problem)
     point = best.state.point()
     derivatives = [problem.jacobian(
         point, item.effect.forms[0].parameters, best.state.residual, central=False)
         for item in machine.learnable]
-    for base in [best, found.none.with_jacobian(problem)][:1 + bool(best.effects)]:
+    for base in [best, found.none][:1 + bool(best.effects)]:
+        base = base.with_jacobian(problem)
         # a fit may exceed its promise, as in the search
         least = (evidence(best) - evidence(base)) / problem.settings.search.hope
         for place, item in _promised(problem, base, base.state.point(), derivatives)[:_FITTED]:
