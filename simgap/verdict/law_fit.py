@@ -131,7 +131,7 @@ def _learnt(found: Found) -> Iterator[_Tried]:
                             key=lambda sizes: problem.loss(problem.residuals(
                                 {**base.state.point(), **sizes})))
                 yield machine, place, moves.added(problem, base, item, begin)
-    for effect in best.effects:  # it may be what a law of its part has done
+    for effect in best.effects if best.effects[1:] else ():  # a law pays one price for several
         gone, part = best.parameters_of([effect]), machine.catalogue[effect].component
         rest = {name: value for name, value in point.items() if name not in gone}
         for place, item in [law for law in _promised(problem, best, rest, derivatives)
