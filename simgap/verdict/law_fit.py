@@ -19,7 +19,7 @@ import numpy as np
 from simgap.fit.broyden import Jacobian
 from simgap.fit.least_squares import LeastSquares
 from simgap.fit.noise import with_model_error, with_noise_left
-from simgap.machine.contract import Machine, Point
+from simgap.machine.contract import Learnable, Machine, Point
 from simgap.machine.with_law import FARTHEST, Law, WithLaw
 from simgap.search import moves
 from simgap.search.evidence import Evidence
@@ -86,12 +86,12 @@ def lawful_fit(found: Found, places: Sequence[Place], threads: int = 1) -> Lawfu
 
 
 def _promised(problem: LeastSquares, base: Hypothesis, point: Point,
-              derivatives: Sequence[Jacobian]) -> list[tuple[Place, Sensitivity]]:
+              learnable: Sequence[tuple[Learnable, Jacobian]]) -> list[tuple[Place, Sensitivity]]:
     """Return the laws that may act at a point of a hypothesis, the likeliest first."""
     evidence, count = InputEvidence.at(problem, point, base.state.jacobian[
         :, :len(problem.machine.nuisances)]), len(problem.experiments)
     laws = []
-    for item, columns in zip(problem.machine.learnable, derivatives, strict=True):
+    for item, columns in learnable:
         [form], effect = item.effect.forms, item.effect
         scaled = columns.astype(float) * (step := form.parameters[0].step)
         square, slope = evidence.reduced([scaled[problem.rows(k)] for k in range(count)])
@@ -117,14 +117,14 @@ def _learnt(found: Found) -> Iterator[_Tried]:
     problem, machine, evidence = found.problem, found.problem.machine, found.evidence
     best = found.best.with_jacobian(problem)
     point = best.state.point()
-    derivatives = [problem.jacobian(
-        point, item.effect.forms[0].parameters, best.state.residual, central=False)
+    learnable = [(item, problem.jacobian(
+        point, item.effect.forms[0].parameters, best.state.residual, central=False))
         for item in machine.learnable]
     for base in [best, found.none][:1 + bool(best.effects)]:
         base = base.with_jacobian(problem)
         # a fit may exceed its promise, as in the search
         least = (evidence(best) - evidence(base)) / problem.settings.search.hope
-        for place, item in _promised(problem, base, base.state.point(), derivatives)[:_FITTED]:
+        for place, item in _promised(problem, base, base.state.point(), learnable)[:_FITTED]:
             if place.evidence > max(evidence.price([item.form]), least):
                 # where it is strong, its derivatives at nothing say little
                 begin = min((dict.fromkeys(item.form.start, 0.0), item.form.start),
@@ -134,8 +134,8 @@ def _learnt(found: Found) -> Iterator[_Tried]:
     for effect in best.effects if best.effects[1:] else ():  # a law pays one price for several
         gone, part = best.parameters_of([effect]), machine.catalogue[effect].component
         rest = {name: value for name, value in point.items() if name not in gone}
-        for place, item in [law for law in _promised(problem, best, rest, derivatives)
-                            if law[0].component == part][:1]:
+        for place, item in _promised(problem, best, rest, [
+                law for law in learnable if law[0].effect.component == part])[:1]:
             law = moves.exchanged(problem, best, effect, item.effect, item.form)
             yield machine, place, moves.settled(problem, law, problem.settings.search.passes)
 
